@@ -38,6 +38,7 @@ tl::expected<RawLog, LogError> read_raw_log(const std::string& path) {
   if (!content) return tl::unexpected(content.error());
   const std::span bytes(reinterpret_cast<const std::uint8_t*>(content->data()), content->size());
   if (is_mcap(bytes)) return raw_log_of_mcap(path, bytes);
+  if (content->size() < kMagic.size() && kMagic.starts_with(*content)) return RawLog{{}, 0};
   if (!content->starts_with(kMagic))
     return tl::unexpected(
         LogError{LogError::Kind::bad_data,

@@ -170,7 +170,8 @@ struct RawRecord {
 
 struct RawLog {
   std::vector<RawRecord> records;
-  std::optional<std::uint64_t> cut_at;  ///< offset of a last record that a crash cut short; it is not in `records`
+  /// Offset of a last record (0: of the first line) that a crash cut short; it is not in `records`.
+  std::optional<std::uint64_t> cut_at;
 };
 
 /// The record that these bytes begin with. Nothing: they begin with none, or with part of one.

@@ -102,5 +102,8 @@ double takeoff_clearance(const World& world, const reach::ReachTube& tube, doubl
 /// Smallest lateral clearance of a vertical tube: obstacles beside it, not the floor below (docs/model.md section 4),
 /// m.
 double lateral_clearance(const World& world, const reach::ReachTube& tube);
+/// The same of a map without its world.
+double lateral_clearance(const map::OccupancyGrid& grid, const Vehicle& vehicle, std::optional<double> margin,
+                         const reach::ReachTube& tube);
 
 }  // namespace backwash::plan

@@ -42,8 +42,11 @@ std::vector<Setpoint> vertical_commands(const Vec3& from_W, const Vec3& to_W, do
 }
 
 double lateral_clearance(const World& world, const reach::ReachTube& tube) {
-  const auto& grid = world.grid;
-  const auto& vehicle = world.reach.vehicle;
+  return lateral_clearance(world.grid, world.reach.vehicle, world.constant_margin, tube);
+}
+
+double lateral_clearance(const map::OccupancyGrid& grid, const Vehicle& vehicle, std::optional<double> margin,
+                         const reach::ReachTube& tube) {
   const double a = grid.resolution(), body = vehicle.body.radius + vehicle.estimation.position;
   double least = kLateralCap;
   for (std::size_t n = 0; n < tube.size(); ++n) {
@@ -51,7 +54,7 @@ double lateral_clearance(const World& world, const reach::ReachTube& tube) {
     const Vec3& to = tube[std::min(n + 1, tube.size() - 1)].center.p_W;
     const Vec3 middle = (from + to) / 2;
     PerDirection h = tube[n].half_widths_interval;
-    if (world.constant_margin) h.fill(*world.constant_margin);
+    if (margin) h.fill(*margin);
     for (std::size_t d = 0; d < kDirections; ++d) h[d] += std::abs(unit(static_cast<Direction>(d)).dot(to - from)) / 2;
     // Wider than the grid, without a bound, or no number: it meets the outside, and no voxels have such numbers.
     const double all = grid.size().maxCoeff() * a;

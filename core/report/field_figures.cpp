@@ -81,7 +81,8 @@ Figure field_slice_figure(const map::OccupancyGrid& grid, const Slice& slice, co
   }
   const double span_h = blank.size[blank.horizontal], span_v = blank.size[blank.vertical];
   const bool beside = span_v >= span_h;  // tall maps beside each other, wide ones below each other
-  script << palette() << "set cbrange [0:" << largest << "]\nset size ratio -1\nset tics out nomirror\n"
+  script << palette() << "set cbrange [0:" << (largest > 0 ? largest : 1)
+         << "]\nset size ratio -1\nset tics out nomirror\n"
          << "set cblabel 'standard deviation, m/s^2'\nset border 3\nset object 1 rectangle from graph 0,0 to graph 1,1 "
             "behind fillcolor '#b9b9b9' fillstyle solid noborder\n"
          << "set xlabel '" << names[blank.horizontal] << ", m'\nset ylabel '" << names[blank.vertical] << ", m'\n"
@@ -120,7 +121,7 @@ Figure flight_field_figure(std::span<const Vec3> path_W, const plan::World& worl
   script << block("field", raster, grid) << cell_blocks(grid, first, last, view.height_m, view.height_m)
          << "$path << EOD\n"
          << path.str() << "EOD\n"
-         << palette() << "set cbrange [0:" << largest << "]\nset tics out nomirror\nset border 3\n"
+         << palette() << "set cbrange [0:" << (largest > 0 ? largest : 1) << "]\nset tics out nomirror\nset border 3\n"
          << view_from_above(grid, first, last)
          << "set cblabel 'bound of the vertical disturbance, m/s^2'\nset key outside top center horizontal\n"
          << "plot $field using 1:2:3 with image notitle, " << plot_cells()

@@ -2,6 +2,7 @@
 #include "core/report/figure_parts.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <sstream>
 
 namespace backwash::report {
@@ -49,6 +50,30 @@ std::string view_from_above(const map::OccupancyGrid& grid, const Index3& first,
   text << "set xrange [" << low.x() << ':' << high.x() << "]\nset yrange [" << low.y() << ':' << high.y()
        << "]\nset size ratio -1\nset xlabel 'x, m'\nset ylabel 'y, m'\n";
   return text.str();
+}
+
+std::string outlines(const std::string& name, std::span<const Prism> tube, double radius) {
+  std::ostringstream text;
+  text << '$' << name << " << EOD\n";
+  Vec3 drawn = Vec3::Constant(std::numeric_limits<double>::infinity());
+  for (std::size_t k = 0; k < tube.size(); ++k) {
+    if ((tube[k].center_W - drawn).norm() < 0.01 && k + 1 < tube.size()) continue;  // 1 cm apart is dense enough
+    drawn = tube[k].center_W;
+    PerDirection h = tube[k].half_widths;
+    for (double& value : h) value += radius;
+    auto corners = octagon(h);
+    corners.push_back(corners.front());
+    for (const auto& corner : corners) text << drawn.x() + corner.x() << ' ' << drawn.y() + corner.y() << '\n';
+    text << '\n';
+  }
+  text << "EOD\n";
+  return text.str();
+}
+
+std::string plot_band(const std::string& name, const std::string& fill, const std::string& border,
+                      const std::string& title) {
+  return "$" + name + " with lines linewidth 2 linecolor '" + border + "' notitle, $" + name +
+         " with filledcurves closed fillstyle solid noborder linecolor '" + fill + "' title '" + title + "', ";
 }
 
 std::string plot_cells() {

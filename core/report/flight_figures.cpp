@@ -13,35 +13,6 @@ namespace {
 const char* const kFlown = "linewidth 2 linecolor '#0b3d91'";
 const char* const kCommanded = "linewidth 1.5 dashtype 2 linecolor '#d1495b'";
 
-PerDirection grown(PerDirection h, double radius) {
-  for (double& value : h) value += radius;
-  return h;
-}
-
-/// Closed outlines of the tube from above, one polygon an entry, every `stride`-th entry and the last.
-std::string outlines(const std::string& name, const reach::ReachTube& tube, double radius) {
-  std::ostringstream text;
-  text << '$' << name << " << EOD\n";
-  Vec3 drawn = Vec3::Constant(std::numeric_limits<double>::infinity());
-  for (std::size_t k = 0; k < tube.size(); ++k) {
-    if ((tube[k].center.p_W - drawn).norm() < 0.01 && k + 1 < tube.size()) continue;  // 1 cm apart is dense enough
-    drawn = tube[k].center.p_W;
-    auto corners = octagon(grown(tube[k].half_widths_interval, radius));
-    corners.push_back(corners.front());
-    for (const auto& corner : corners) text << drawn.x() + corner.x() << ' ' << drawn.y() + corner.y() << '\n';
-    text << '\n';
-  }
-  text << "EOD\n";
-  return text.str();
-}
-
-/// A band as the union of filled polygons: outlines below, fills above, so that only the union's border remains.
-std::string plot_band(const std::string& name, const std::string& fill, const std::string& border,
-                      const std::string& title) {
-  return "$" + name + " with lines linewidth 2 linecolor '" + border + "' notitle, $" + name +
-         " with filledcurves closed fillstyle solid noborder linecolor '" + fill + "' title '" + title + "', ";
-}
-
 /// The voxel height of the first cell that is not free below (direction −1) or above (+1) a point, m.
 double first_obstacle(const map::OccupancyGrid& grid, const Vec3& p, int direction) {
   Index3 v = grid.index(p);
@@ -72,8 +43,10 @@ Figure map_figure(const sim::Flight& flight, const plan::World& world) {
   const auto& vehicle = world.reach.vehicle;
   const double reserve = vehicle.body.radius + vehicle.estimation.position;
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  std::vector<Prism> sets;
   for (const auto& step : tube) {
     const auto& h = step.half_widths_interval;
+    sets.push_back({step.center.p_W, h});
     const Vec3 extent = Vec3(h[kX], h[kY], h[kZ]) + Vec3::Constant(reserve);
     low = low.cwiseMin(step.center.p_W - extent), high = high.cwiseMax(step.center.p_W + extent);
   }
@@ -82,8 +55,8 @@ Figure map_figure(const sim::Flight& flight, const plan::World& world) {
   const Index3 first = grid.index(low - around).cwiseMax(0),
                last = grid.index(high + around).cwiseMin(grid.size() - Index3::Ones());
   std::ostringstream script;
-  script << cell_blocks(grid, first, last, low.z(), high.z()) << outlines("tube", tube, 0)
-         << outlines("body", tube, reserve) << "$path << EOD\n";
+  script << cell_blocks(grid, first, last, low.z(), high.z()) << outlines("tube", sets, 0)
+         << outlines("body", sets, reserve) << "$path << EOD\n";
   for (const auto& s : flight.route.samples) {
     script << s.truth.p_W.x() << ' ' << s.truth.p_W.y() << ' ' << s.command.p_W.x() << ' ' << s.command.p_W.y() << '\n';
   }

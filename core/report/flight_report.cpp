@@ -116,22 +116,20 @@ std::string parameters_html(const std::string& command,
 }
 
 tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, const sim::FlightSummary& summary,
-                                                   const plan::World& world, const ReportContext& context,
-                                                   const RecordedBeside* recorded) {
+                                                   const plan::World& world, const ReportContext& context) {
   std::string page = "<h1>One flight, and the sets it was planned with</h1>\n";
   page += "<p class=\"context\">Map " + escaped(context.map) + ", vehicle " + escaped(context.vehicle) + ", model " +
-          escaped(context.model) + "; from " + point(context.start_W) + " to " + point(context.goal_W) +
-          (context.seed ? "; seed " + std::to_string(*context.seed) : "; recorded");
+          escaped(context.model) + "; from " + point(context.start_W) + " to " + point(context.goal_W) + "; seed " +
+          std::to_string(context.seed);
   if (context.sigma_scale != 1) page += "; judged with sets of \u03a3 \u00d7 " + number(context.sigma_scale, 3, "");
   page += "; backwash " + escaped(context.version) + "</p>\n" + verdict(summary);
-  PageData data = recorded ? recorded->data : PageData{};
-  for (auto& t : flight_tables(flight, world)) data.tables.push_back(std::move(t));
+  PageData data;
+  data.tables = flight_tables(flight, world);
   data.scene = flight_scene(flight, world);
   data.field = field_box(world, field_view(world.grid, route_of(flight)));
-  page += (recorded ? recorded->timeline : "") + scene_html(*data.scene);
-  auto sections = sections_of(flight, world);
+  page += scene_html(*data.scene);
+  const auto sections = sections_of(flight, world);
   for (const auto& section : sections) data.plots.insert(data.plots.end(), section.plots.begin(), section.plots.end());
-  if (recorded) sections.insert(sections.end(), recorded->sections.begin(), recorded->sections.end());
   for (const auto& section : sections) {
     if (!section.drawing) return tl::make_unexpected(section.drawing.error());
     page += to_html(section);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -17,20 +16,12 @@ namespace backwash::report {
 struct ReportContext {
   std::string map, model, vehicle;  ///< as given on the command line
   std::string version;
-  Vec3 start_W, goal_W;               ///< m
-  std::optional<std::uint64_t> seed;  ///< of a simulated flight; a recorded one has none
+  Vec3 start_W, goal_W;  ///< m
+  std::uint64_t seed;
   double sigma_scale;
   std::string command;  ///< the line that wrote the page
   std::vector<std::pair<std::string, std::string>>
       parameters;  ///< files that the flight was flown with: names, contents
-};
-
-/// What a raw log adds to a flight: HTML of its timeline, sections about the machine, and the data of both. Its times
-/// are the flight's.
-struct RecordedBeside {
-  std::string timeline;
-  std::vector<Section> sections;
-  PageData data;
 };
 
 /// The field at the mean height of a path that holds a point; its table is the page's own (PageData::field).
@@ -41,10 +32,9 @@ std::string parameters_html(const std::string& command,
                             const std::vector<std::pair<std::string, std::string>>& parameters);
 
 /// One self-contained HTML page about a flight: verdict, figures, a table of what was measured. Nothing in it refers to
-/// another file or host. `recorded`: of a flight by the daemon; null: of a simulated one. Error: a figure that could
+/// another file or host. Error: a figure that could
 /// not be drawn.
 tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, const sim::FlightSummary& summary,
-                                                   const plan::World& world, const ReportContext& context,
-                                                   const RecordedBeside* recorded = nullptr);
+                                                   const plan::World& world, const ReportContext& context);
 
 }  // namespace backwash::report

@@ -139,6 +139,41 @@ const char* line_of(const std::string& kind) {
   return kind == "bound" ? "linewidth 1.5 linecolor '#4a8fce'" : "linewidth 1.2 dashtype 2 linecolor '#8a8a8a'";
 }
 
+/// All plots below each other.
+Figure plots_figure(const DataTable& table, const std::vector<TimePlot>& plots) {
+  std::ostringstream script;
+  script << "$rows << EOD\n";
+  for (const auto& row : table.rows) {
+    for (const double value : row) std::isnan(value) ? script << "NaN " : script << value << ' ';
+    script << '\n';
+  }
+  script << "EOD\n"
+         << kAxes << "set lmargin 10\nset key outside top center horizontal\nset multiplot layout " << plots.size()
+         << ",1\n";
+  for (const auto& plot : plots) {
+    if (&plot == &plots.back()) script << "set xlabel 'time, s'\n";
+    script << "set ylabel " << gnuplot_quoted(plot.name + ", " + plot.unit) << "\nplot ";
+    for (const auto& curve : plot.curves) {
+      const auto column = std::ranges::find(table.columns, curve.column) - table.columns.begin() + 1;
+      if (curve.mirrored)
+        script << "$rows using 1:(-$" << column << ") with lines " << line_of(curve.kind) << " notitle, ";
+      script << "$rows using 1:" << column << " with lines " << line_of(curve.kind) << " title "
+             << gnuplot_quoted(curve.name) << (&curve == &plot.curves.back() ? "\n" : ", ");
+    }
+  }
+  script << "unset multiplot\n";
+  return draw(script.str(), Format::svg, 1000, 60 + 220 * static_cast<int>(plots.size()));
+}
+
+/// Whether the table has a value of it.
+bool has_values(const DataTable& table, const TimePlot& plot) {
+  return std::ranges::any_of(plot.curves, [&](const Curve& curve) {
+    const auto column = std::ranges::find(table.columns, curve.column) - table.columns.begin();
+    return std::ranges::any_of(table.rows,
+                               [&](const auto& row) { return !std::isnan(row[static_cast<std::size_t>(column)]); });
+  });
+}
+
 }  // namespace
 
 DataTable thinned(DataTable table, std::size_t most) {
@@ -177,29 +212,21 @@ std::string to_html(const Section& section) {
   return html + "<p class=\"files\" data-tables=\"" + escaped(tables) + "\"></p>\n</section>\n";
 }
 
-Figure plots_figure(const DataTable& table, const std::vector<TimePlot>& plots) {
-  std::ostringstream script;
-  script << "$rows << EOD\n";
-  for (const auto& row : table.rows) {
-    for (const double value : row) std::isnan(value) ? script << "NaN " : script << value << ' ';
-    script << '\n';
-  }
-  script << "EOD\n"
-         << kAxes << "set lmargin 10\nset key outside top center horizontal\nset multiplot layout " << plots.size()
-         << ",1\n";
-  for (const auto& plot : plots) {
-    if (&plot == &plots.back()) script << "set xlabel 'time, s'\n";
-    script << "set ylabel " << gnuplot_quoted(plot.name + ", " + plot.unit) << "\nplot ";
-    for (const auto& curve : plot.curves) {
-      const auto column = std::ranges::find(table.columns, curve.column) - table.columns.begin() + 1;
-      if (curve.mirrored)
-        script << "$rows using 1:(-$" << column << ") with lines " << line_of(curve.kind) << " notitle, ";
-      script << "$rows using 1:" << column << " with lines " << line_of(curve.kind) << " title "
-             << gnuplot_quoted(curve.name) << (&curve == &plot.curves.back() ? "\n" : ", ");
-    }
-  }
-  script << "unset multiplot\n";
-  return draw(script.str(), Format::svg, 1000, 60 + 220 * static_cast<int>(plots.size()));
+void add_plots(std::vector<Section>& sections, PageData& data, DataTable table, const std::string& title,
+               const std::string& text, std::vector<TimePlot> plots) {
+  std::string without;
+  std::erase_if(plots, [&](const TimePlot& plot) {
+    if (has_values(table, plot)) return false;
+    without += (without.empty() ? "" : ", ") + plot.name;
+    return true;
+  });
+  const std::string said =
+      without.empty() ? text : text + " Not drawn, because the log has no value of it: " + without + ".";
+  sections.push_back({title, said, plots.empty() ? Figure("") : plots_figure(table, plots), plots, {}});
+  data.plots.insert(data.plots.end(), plots.begin(), plots.end());
+  if (table.rows.empty()) return;
+  sections.back().tables.push_back(table.id);
+  data.tables.push_back(std::move(table));
 }
 
 std::string script_quoted(const std::string& text) {

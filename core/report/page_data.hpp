@@ -48,8 +48,6 @@ struct Section {
 };
 /// Precondition: it has a drawing.
 std::string to_html(const Section& section);
-/// All plots of a section below each other, drawn by gnuplot.
-Figure plots_figure(const DataTable& table, const std::vector<TimePlot>& plots);
 
 /// A set predicted for some moment: |unit(d)·(p − center)| ≤ half_widths[d].
 struct Prism {
@@ -79,6 +77,11 @@ struct PageData {
   std::optional<Scene> scene;
   std::optional<FieldBox> field;  ///< the page makes the table "field" of its layer
 };
+
+/// Adds a section of plots below each other, drawn by gnuplot, and to `data` its table and plots. A plot that the table
+/// has no value for is none, and the section says so.
+void add_plots(std::vector<Section>& sections, PageData& data, DataTable table, const std::string& title,
+               const std::string& text, std::vector<TimePlot> plots);
 
 /// Text as a string of JSON that may stand inside a script element whatever it holds: nothing in it ends one, and it is
 /// ASCII alone. The one way of text into a script.

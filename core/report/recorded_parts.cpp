@@ -7,7 +7,9 @@
 #include "core/types/text.hpp"
 
 namespace backwash::report {
+namespace {
 
+/// Nothing: the record is of another kind, or too short for the head.
 std::optional<RecordedSegment> recorded_segment(const log::RawRecord& record) {
   if (record.header.kind != log::RecordKind::segment || record.bytes.size() < sizeof(log::SegmentRecord)) return {};
   RecordedSegment s;
@@ -23,6 +25,28 @@ std::optional<RecordedSegment> recorded_segment(const log::RawRecord& record) {
       s.commands.push_back(c);
   }
   return s;
+}
+
+}  // namespace
+
+std::vector<RecordedSegment> recorded_segments(std::span<const log::RawRecord> log) {
+  std::vector<RecordedSegment> segments;
+  for (const auto& record : log)
+    if (auto segment = recorded_segment(record)) segments.push_back(*std::move(segment));
+  return segments;
+}
+
+bool vertical(const RecordedSegment& s) {
+  constexpr double kVertical = 0.01;  // m across: what stays within it rises or sinks on one line
+  const auto beside = [&](const Setpoint& c) { return (c.p_W - s.commands.front().p_W).head<2>().norm(); };
+  return !s.commands.empty() && std::ranges::all_of(s.commands, [&](auto& c) { return beside(c) < kVertical; }) &&
+         s.commands.back().p_W.z() > s.commands.front().p_W.z() + kVertical;
+}
+
+std::int64_t first_tick_ns(std::span<const log::RawRecord> log) {
+  const auto first = std::ranges::find(log, log::RecordKind::tick, [](auto& r) { return r.header.kind; });
+  if (first != log.end()) return first->header.t_ns;
+  return log.empty() ? 0 : log.front().header.t_ns;
 }
 
 std::vector<std::string> AirNews::take(const log::RawRecord& record) {
@@ -54,7 +78,9 @@ std::vector<std::string> AirNews::take(const log::RawRecord& record) {
   return news;
 }
 
-Vec3 TruthRows::at(double t, const char* x, const char* y, const char* z) const {
+std::optional<Vec3> TruthRows::at(double t, const char* x, const char* y, const char* z) const {
+  constexpr double kBeyond = 0.1;  // s
+  if (t < log_.t_s.front() - kBeyond || t > log_.t_s.back() + kBeyond) return std::nullopt;
   const auto after = std::upper_bound(log_.t_s.begin(), log_.t_s.end(), t);
   const auto i = static_cast<std::size_t>(
       std::clamp<std::ptrdiff_t>(after - log_.t_s.begin(), 1, static_cast<std::ptrdiff_t>(log_.t_s.size()) - 1));
@@ -63,7 +89,7 @@ Vec3 TruthRows::at(double t, const char* x, const char* y, const char* z) const 
     const auto& column = log_.column(name);
     return (1 - f) * column[i - 1] + f * column[i];
   };
-  return {value(x), value(y), value(z)};
+  return Vec3(value(x), value(y), value(z));
 }
 
 }  // namespace backwash::report

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,12 @@ struct RecordedSegment {
   std::vector<Setpoint> commands;  ///< one a control period, W
 };
 
-/// Nothing: the record is of another kind, or too short for the head.
-std::optional<RecordedSegment> recorded_segment(const log::RawRecord& record);
+/// Those of a log, in their order.
+std::vector<RecordedSegment> recorded_segments(std::span<const log::RawRecord> log);
+/// Whether a trajectory rises on one line.
+bool vertical(const RecordedSegment& segment);
+/// CLOCK_MONOTONIC of a log's first tick; without one of its first record, of an empty log 0.
+std::int64_t first_tick_ns(std::span<const log::RawRecord> log);
 
 /// What a log tells of its air, record by record.
 class AirNews {
@@ -36,8 +41,9 @@ class TruthRows {
  public:
   /// `log` has two rows or more with rising stamps, and outlives this.
   explicit TruthRows(const log::FlightLog& log) : log_(log) {}
-  /// The columns x, y, z at t (s, the log's clock), linear in between; beyond its ends the nearest row.
-  Vec3 at(double t, const char* x, const char* y, const char* z) const;
+  /// The columns x, y, z at t (s, the log's clock), linear in between; beyond its ends by up to 0.1 s the nearest row,
+  /// farther away nothing.
+  std::optional<Vec3> at(double t, const char* x, const char* y, const char* z) const;
 
  private:
   const log::FlightLog& log_;

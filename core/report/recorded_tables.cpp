@@ -11,7 +11,7 @@
 #include "core/log/tick_log.hpp"
 #include "core/report/figure_parts.hpp"
 #include "core/report/plot.hpp"
-#include "core/report/recorded_flight.hpp"
+#include "core/report/recorded_map.hpp"
 
 namespace backwash::report {
 namespace {
@@ -134,33 +134,7 @@ void add_places(std::vector<Section>& sections, std::span<const log::RawRecord> 
        {table.id}});
 }
 
-/// Adds the section if the table has rows.
-void add(std::vector<Section>& sections, PageData& data, DataTable table, const char* title, const char* text,
-         std::vector<TimePlot> plots) {
-  if (table.rows.size() < 2) return;
-  auto drawing = plots_figure(table, plots);
-  sections.push_back({title, text, std::move(drawing), plots, {table.id}});
-  data.tables.push_back(std::move(table));
-  data.plots.insert(data.plots.end(), plots.begin(), plots.end());
-}
-
 }  // namespace
-
-std::optional<std::int64_t> first_tick_ns(std::span<const log::RawRecord> log, std::optional<std::uint64_t> segment) {
-  for (const auto& record : log) {
-    if (record.header.kind != RecordKind::tick) continue;
-    const auto* tick = log::payload<log::TickRecord>(record);
-    if (tick && (!segment || tick->segment == *segment)) return record.header.t_ns;
-  }
-  return std::nullopt;
-}
-
-std::optional<std::uint64_t> first_segment(std::span<const log::RawRecord> log) {
-  for (const auto& record : log)
-    if (record.header.kind == RecordKind::segment)
-      if (const auto* head = log::payload<log::SegmentRecord>(record)) return head->id;
-  return std::nullopt;
-}
 
 DataTable recorded_error(std::span<const log::RawRecord> log, std::int64_t zero_ns) {
   DataTable table{
@@ -230,14 +204,18 @@ std::vector<Prism> recorded_tube(std::span<const log::RawRecord> log) {
 
 std::vector<Section> recorded_sections(std::span<const log::RawRecord> log, std::int64_t zero_ns, PageData& data) {
   std::vector<Section> sections;
+  const auto add = [&](DataTable table, const char* title, const char* text, std::vector<TimePlot> plots) {
+    add_plots(sections, data, std::move(table), title, text, std::move(plots));
+  };
   const DataTable air = recorded_air(log, zero_ns);
-  add(sections, data, air, "Air",
-      "What was learnt of it, by class: the factor on the model's variance that the sets were grown by, and the "
-      "evidence "
-      "that it is above 1, as a share of what it takes.",
-      {air_plot(air, "factor", "factor", "× variance"), air_plot(air, "evidence", "evidence", "share")});
+  if (!air.rows.empty())
+    add(air, "Air",
+        "What was learnt of it, by class: the factor on the model's variance that the sets were grown by, and the "
+        "evidence "
+        "that it is above 1, as a share of what it takes.",
+        {air_plot(air, "factor", "factor", "× variance"), air_plot(air, "evidence", "evidence", "share")});
   add_places(sections, log, air);
-  add(sections, data, tick_table(log, zero_ns), "Tick timing",
+  add(tick_table(log, zero_ns), "Tick timing",
       "As each tick logged it: of the tick before it how long it computed and how late it began; and from a sample's "
       "reception to the set-point that first used it.",
       {{"ticks-compute",
@@ -246,7 +224,7 @@ std::vector<Section> recorded_sections(std::span<const log::RawRecord> log, std:
         "µs",
         {{"compute_us", "computing", "flown"}, {"lateness_us", "late", "commanded"}}},
        {"ticks-wire", "ticks", "odometry to wire", "µs", {{"odometry_to_wire_us", "odometry to wire", "flown"}}}});
-  add(sections, data, rate_table(log, zero_ns), "Link and odometry rates",
+  add(rate_table(log, zero_ns), "Link and odometry rates",
       "Records of each whole second: odometry taken, MAVLink frames received and sent, control ticks.",
       {{"rates-link",
         "rates",
@@ -258,7 +236,7 @@ std::vector<Section> recorded_sections(std::span<const log::RawRecord> log, std:
         "odometry, ticks, scans",
         "1/s",
         {{"odometry_hz", "odometry", "flown"}, {"ticks_hz", "ticks", "bound"}, {"scans_hz", "scans", "paper"}}}});
-  add(sections, data, battery_table(log, zero_ns), "Battery", "Remaining share, as the autopilot says it.",
+  add(battery_table(log, zero_ns), "Battery", "Remaining share, as the autopilot says it.",
       {{"battery", "battery", "battery", "share", {{"battery_share", "remaining", "flown"}}}});
   return sections;
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,12 +9,6 @@
 #include "core/report/page_data.hpp"
 
 namespace backwash::report {
-
-/// When the first tick of a log was, or of a segment in it. Nothing: it holds none.
-std::optional<std::int64_t> first_tick_ns(std::span<const log::RawRecord> log,
-                                          std::optional<std::uint64_t> segment = std::nullopt);
-/// The number of the first segment that a log holds.
-std::optional<std::uint64_t> first_segment(std::span<const log::RawRecord> log);
 
 /// Of each tick with a judged position: error and bound on each axis as they were logged. Times are since `zero_ns`,
 /// here and below.
@@ -27,7 +20,7 @@ std::vector<TimePlot> error_plots(bool ellipsoids);
 std::vector<Prism> recorded_tube(std::span<const log::RawRecord> log);
 
 /// What a log says of the air, where the flight learnt of it, and of the machine: tick timing, link and odometry rates,
-/// battery. Each with its table in `data`, where the log has any of it.
+/// battery. Each with its table in `data`; what the log has nothing of is said.
 std::vector<Section> recorded_sections(std::span<const log::RawRecord> log, std::int64_t zero_ns, PageData& data);
 
 /// Of each tick that learnt of its air: place, class, and of each class that was flown in so far its factor and its

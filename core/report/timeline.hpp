@@ -20,7 +20,7 @@ struct Timeline {
   std::vector<TimelineEvent> events;
 };
 
-/// The section: lanes to look at, and the same as a table. Times are shown less `zero_s`.
-std::string timeline_html(const Timeline& timeline, double zero_s = 0);
+/// The section: lanes to look at, and the same as a table.
+std::string timeline_html(const Timeline& timeline);
 
 }  // namespace backwash::report

@@ -8,7 +8,7 @@
 #include "core/field/disturbance_field.hpp"
 #include "core/log/log_columns.hpp"
 #include "core/log/raw_flight.hpp"
-#include "core/report/recorded_flight.hpp"
+#include "core/report/recorded_map.hpp"
 #include "core/study/windows/gates.hpp"
 #include "services/backwash/study_flights.hpp"
 #include "services/backwash/verb.hpp"

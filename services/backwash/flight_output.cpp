@@ -39,7 +39,7 @@ Json to_json(const sim::Flight& flight, const sim::FlightSummary& s, const repor
           {"map", context.map},
           {"start", services::to_json(context.start_W)},
           {"goal", services::to_json(context.goal_W)},
-          {"seed", context.seed ? Json(*context.seed) : Json()},
+          {"seed", context.seed},
           {"sigma_scale", context.sigma_scale},
           {"length_m", s.length_m},
           {"time_s", s.time_s},
@@ -58,8 +58,7 @@ Json to_json(const sim::Flight& flight, const sim::FlightSummary& s, const repor
 void print_text(const sim::Flight& flight, const sim::FlightSummary& s, const report::ReportContext& context) {
   const auto& m = flight.plan.metrics;
   std::printf("flight               %s, %s to %s, %s\n", context.map.c_str(), to_text(context.start_W).c_str(),
-              to_text(context.goal_W).c_str(),
-              context.seed ? ("seed " + std::to_string(*context.seed)).c_str() : "recorded");
+              to_text(context.goal_W).c_str(), ("seed " + std::to_string(context.seed)).c_str());
   std::printf("goal                 %s, %.3f m off at the end\n", s.goal_reached ? "reached" : "MISSED",
               s.goal_error_m);
   std::printf("path, time           %.2f m, %.2f s\n", s.length_m, s.time_s);
@@ -83,10 +82,10 @@ void print_text(const sim::Flight& flight, const sim::FlightSummary& s, const re
 }  // namespace
 
 int conclude(const JudgedFlight& judged, const std::string& report, bool json, bool force) {
-  const auto& [flight, world, context, summary, recorded] = judged;
+  const auto& [flight, world, context, summary] = judged;
   if (!report.empty()) {
     progress("drawing the report");
-    const auto page = report::flight_report(flight, summary, world, context, recorded);
+    const auto page = report::flight_report(flight, summary, world, context);
     if (!page) throw Failure(kUnavailable, report + ":1: " + page.error().message);
     write_file(report, *page, force);
   }

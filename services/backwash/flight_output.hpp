@@ -8,13 +8,12 @@
 
 namespace backwash::services {
 
-/// A judged flight and where it came from: what `fly` and `report` say about it.
+/// A judged flight and where it came from: what `fly` says about it.
 struct JudgedFlight {
   const sim::Flight& flight;
   const plan::World& world;
   const report::ReportContext& context;
   sim::FlightSummary summary;
-  const report::RecordedBeside* recorded = nullptr;  ///< of a flight by the daemon
 };
 
 /// Prints the summary (one JSON object or text), after writing the HTML page to `report` unless that is empty. Returns

@@ -14,8 +14,7 @@
 namespace backwash::services {
 namespace {
 
-constexpr double kVertical = 0.01;  // m across: what stays within it rises or sinks on one line
-constexpr double kGap = 0.1;        // s without odometry that is worth telling
+constexpr double kGap = 0.1;  // s without odometry that is worth telling
 
 Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
 
@@ -27,26 +26,6 @@ bool as_asked(Reason reason) {
   return std::ranges::find(kAsked, reason) != kAsked.end();
 }
 
-/// Whether a trajectory rises on one line.
-bool vertical(const report::RecordedSegment& s) {
-  const auto beside = [&](const Setpoint& c) { return (c.p_W - s.commands.front().p_W).head<2>().norm(); };
-  return !s.commands.empty() && std::ranges::all_of(s.commands, [&](auto& c) { return beside(c) < kVertical; }) &&
-         s.commands.back().p_W.z() > s.commands.front().p_W.z() + kVertical;
-}
-
-std::vector<report::RecordedSegment> segments_of(const log::RawLog& log) {
-  std::vector<report::RecordedSegment> segments;
-  for (const auto& record : log.records)
-    if (auto segment = report::recorded_segment(record)) segments.push_back(*std::move(segment));
-  return segments;
-}
-
-std::int64_t first_tick(const log::RawLog& log) {
-  const auto first = std::ranges::find(log.records, log::RecordKind::tick, [](auto& r) { return r.header.kind; });
-  if (first != log.records.end()) return first->header.t_ns;
-  return log.records.empty() ? 0 : log.records.front().header.t_ns;
-}
-
 bool airborne(const track::AutopilotFacts& facts) {
   if (!facts.armed) return false;
   return facts.landed ? !*facts.landed : facts.in_air.value_or(false);
@@ -55,13 +34,16 @@ bool airborne(const track::AutopilotFacts& facts) {
 /// Goes through the records in their order.
 class Teller {
  public:
-  Teller(FlightStory& story, const log::RawLog& log, double radius, const log::FlightLog* truth)
-      : story_(story), segments_(segments_of(log)), zero_ns_(first_tick(log)), maps_(log, zero_ns_, radius) {
+  Teller(FlightStory& story, const log::RawLog& log, const Vehicle& vehicle, const log::FlightLog* truth)
+      : story_(story),
+        segments_(report::recorded_segments(log.records)),
+        maps_(log, story.zero_ns, vehicle),
+        truth_error_(truth ? vehicle.estimation.position : 0) {
     if (truth) truth_.emplace(*truth);
   }
 
   void take(const log::RawRecord& record) {
-    now_s_ = 1e-9 * static_cast<double>(record.header.t_ns - zero_ns_);
+    now_s_ = 1e-9 * static_cast<double>(record.header.t_ns - story_.zero_ns);
     using enum log::RecordKind;
     const auto kind = record.header.kind;
     const std::string text(record.bytes.begin(), record.bytes.end());
@@ -147,7 +129,9 @@ class Teller {
     last_tick_s_ = now_s_;
     const bool flying = tick.segment != 0 && (tick.judged || in_air_);
     StorySample s{now_s_, vec(tick.p), vec(tick.cmd_p), tick.judged != 0, tick.inside != 0, in_air_, Vec3::Zero(), {}};
-    if (truth_) s.p_W = truth_->at(1e-9 * static_cast<double>(t_ns), "x_m", "y_m", "z_m");
+    const auto true_W =
+        truth_ ? truth_->at(1e-9 * static_cast<double>(t_ns), "x_m", "y_m", "z_m") : std::optional<Vec3>();
+    s.p_W = true_W.value_or(s.p_W), story_.beyond_truth += truth_ && !true_W;
     if (s.judged) take_verdict(tick, s);
     if (in_air_ && !was_in_air_) ++story_.take_offs, say("flight", "in the air");
     if (!in_air_ && was_in_air_) ++story_.landings, say("flight", "on the ground");
@@ -155,14 +139,21 @@ class Teller {
       story_.length_m += (s.p_W - story_.samples.back().p_W).norm();
     was_in_air_ = in_air_, flown_ &= in_air_;
     if (flying) take_piece(tick, s);
+    if (in_air_ && open_) measure(tick, t_ns, s);
+    story_.samples.push_back(s);
+  }
+
+  // On its way up and down a vehicle comes as near to the floor as it will.
+  void measure(const log::TickRecord& tick, std::int64_t t_ns, StorySample& s) {
     const auto m = static_cast<Mode>(tick.mode);
-    // On its way up and down a vehicle comes as near to the floor as it will.
-    if (in_air_ && !story_.pieces.empty() && !story_.pieces.back().take_off && open_ &&
-        (m == Mode::tracking || m == Mode::hold)) {
+    const bool steered = m == Mode::tracking || m == Mode::hold;
+    if (story_.pieces.back().take_off) {
+      if (steered || m == Mode::lifting) maps_.judge_rising(t_ns, s.p_W);
+    } else if (steered) {
+      if (s.judged) maps_.judge_set(t_ns, tick);
       s.clearance_m = maps_.clearance(t_ns, s.p_W);
       if (s.clearance_m) story_.clearance_m = std::min(story_.clearance_m.value_or(*s.clearance_m), *s.clearance_m);
     }
-    story_.samples.push_back(s);
   }
 
   void take_mode(const log::TickRecord& tick) {
@@ -204,13 +195,13 @@ class Teller {
     if (!open_ || tick.segment != segment_) {
       const auto known = std::ranges::find(segments_, tick.segment, [](auto& known_one) { return known_one.head.id; });
       // A lift-off alone is no segment: the rise that follows is the same take-off.
-      const bool goes_on =
-          open_ && known != segments_.end() && (known->head.continues != 0 || (commands_ == 0 && vertical(*known)));
+      const bool goes_on = open_ && known != segments_.end() &&
+                           (known->head.continues != 0 || (commands_ == 0 && report::vertical(*known)));
       if (!goes_on) {
         if (open_ && ordered_) end_by_order(story_.pieces.back());
         story_.pieces.push_back({});
         auto& piece = story_.pieces.back();
-        piece.take_off = known == segments_.end() || (vertical(*known) && !flown_), piece.from_s = now_s_;
+        piece.take_off = known == segments_.end() || (report::vertical(*known) && !flown_), piece.from_s = now_s_;
       }
       open_ = true, ordered_ = false, segment_ = tick.segment;
       commands_ = known != segments_.end() ? known->commands.size() : 0;
@@ -224,7 +215,7 @@ class Teller {
       piece.to_its_end = true;
       piece.goal_error_m = (s.p_W - piece.goal_W).norm();
       const Vec3 h(tick.half_widths[kX], tick.half_widths[kY], tick.half_widths[kZ]);
-      piece.reached = piece.goal_error_m <= h.norm() || !tick.judged;
+      piece.reached = piece.goal_error_m <= h.norm() + truth_error_ || !tick.judged;
     } else if (!piece.to_its_end) {
       piece.goal_error_m = (s.p_W - piece.goal_W).norm();
     }
@@ -243,7 +234,8 @@ class Teller {
     }
     if (in_air_) wrong.push_back("the log ends " + story_.ended);
     if (story_.touched())
-      wrong.push_back("an obstacle was touched (clearance " + to_text(*story_.clearance_m, 3) + " m)" +
+      wrong.push_back("an obstacle was touched (clearance " +
+                      to_text(std::min(story_.clearance_m.value_or(1), story_.maps.beside_m.value_or(1)), 3) + " m)" +
                       unless_freed(story_.maps));
     if (story_.inside != story_.judged)
       wrong.push_back(std::to_string(story_.judged - story_.inside) + " of " + std::to_string(story_.judged) +
@@ -257,8 +249,8 @@ class Teller {
 
   FlightStory& story_;
   const std::vector<report::RecordedSegment> segments_;
-  std::int64_t zero_ns_;
   MapJudge maps_;
+  double truth_error_;  ///< m, of what the vehicle measures against the truth
   std::optional<report::TruthRows> truth_;
   double now_s_ = 0;
   std::optional<double> last_tick_s_;
@@ -284,11 +276,12 @@ bool FlightStory::goal_reached() const noexcept {
          std::ranges::all_of(pieces, [&](const StoryPiece& p) { return p.take_off || p.reached || p.by_order; });
 }
 
-FlightStory flight_story(const log::RawLog& log, double radius, const log::FlightLog* truth,
+FlightStory flight_story(const log::RawLog& log, const Vehicle& vehicle, const log::FlightLog* truth,
                          const std::string& because) {
   FlightStory story;
-  story.by_truth = truth != nullptr, story.cut_at = log.cut_at;
-  Teller teller(story, log, radius, truth);
+  story.zero_ns = report::first_tick_ns(log.records), story.by_truth = truth != nullptr, story.cut_at = log.cut_at;
+  story.replay = log::replay(log, "the log");
+  Teller teller(story, log, vehicle, truth);
   for (const auto& record : log.records) teller.take(record);
   teller.finish(log.cut_at.has_value(), because);
   return story;

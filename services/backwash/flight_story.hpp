@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/log/flight_log.hpp"
-#include "core/log/raw_log.hpp"
+#include "core/log/tick_log.hpp"
 #include "core/report/timeline.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/mode.hpp"
@@ -41,12 +41,14 @@ struct StorySample {
 /// What a raw log tells of a flight, whatever kind it was: any number of take-offs, routes, holds and landings, or
 /// none.
 struct FlightStory {
+  std::int64_t zero_ns = 0;  ///< CLOCK_MONOTONIC of the log's first tick, time 0
   std::vector<StoryPiece> pieces;
   /// Modes; commands, refusals, changes of the mode, maps, gaps of the VIO, what the daemon could not go on with. Times
   /// are since the log's first tick.
   report::Timeline timeline;
   std::vector<StorySample> samples;
-  bool by_truth = false;  ///< positions are the truth's; otherwise those that the vehicle measured itself
+  bool by_truth = false;         ///< positions are the truth's; otherwise those that the vehicle measured itself
+  std::size_t beyond_truth = 0;  ///< ticks that a given truth does not cover: measured positions
   std::size_t take_offs = 0, landings = 0, holds = 0, refusals = 0;
   std::size_t judged = 0, inside = 0;
   double time_s = 0, length_m = 0;    ///< of the log; of the way in the air
@@ -55,20 +57,20 @@ struct FlightStory {
   Vec3 largest_ratio = Vec3::Zero();  ///< largest |e|/h per axis
   std::string ended;                  ///< how the log ends, in words
   std::uint64_t records_lost = 0;
-  std::optional<std::uint64_t> cut_at;  ///< byte from which on a last record was cut short
-  std::vector<std::string> wrong;       ///< why the flight was not good, the gravest first; empty: it was
+  tl::expected<log::Replay, log::LogError> replay;  ///< whether what it decided follows from what it was told
+  std::optional<std::uint64_t> cut_at;              ///< byte from which on a last record was cut short
+  std::vector<std::string> wrong;                   ///< why the flight was not good, the gravest first; empty: it was
 
   bool ok() const noexcept { return wrong.empty(); }
   bool goal_reached() const noexcept;  ///< each route that nobody ended was; false without one
-  bool touched() const noexcept { return clearance_m && *clearance_m <= 0; }
+  bool touched() const noexcept { return clearance_m.value_or(1) <= 0 || maps.beside_m.value_or(1) <= 0; }
 };
 
-/// Reads the story out of a raw log. `radius`: of the body, m, for clearances to the maps that the log holds
-/// (MapJudge). `truth`: the bench's log of the same flight, columns t_s, x_m, y_m, z_m on the same monotonic clock;
-/// null: the positions are those that the vehicle measured, and clearances hold up to the error of its estimate. The
-/// sets are those that the daemon logged; nothing is propagated again. `because`: what ended the flight, as others saw
-/// it.
-FlightStory flight_story(const log::RawLog& log, double radius, const log::FlightLog* truth = nullptr,
+/// Reads the story out of a raw log, whatever it holds. `vehicle`: for clearances to the maps in it (MapJudge).
+/// `truth`: the bench's log of the same flight, columns t_s, x_m, y_m, z_m on the same monotonic clock; null: the
+/// positions are those that the vehicle measured, and clearances hold up to the error of its estimate. The sets are
+/// those that the daemon logged; nothing is propagated again. `because`: what ended the flight, as others saw it.
+FlightStory flight_story(const log::RawLog& log, const Vehicle& vehicle, const log::FlightLog* truth = nullptr,
                          const std::string& because = "");
 
 }  // namespace backwash::services

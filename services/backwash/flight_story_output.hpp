@@ -18,6 +18,9 @@ void print_text(const FlightStory& story, const std::string& log);
 std::string why(const FlightStory& story);
 std::string name_of(const StoryPiece& piece);
 std::string end_of(const StoryPiece& piece);
+/// Clearances, and what was not judged; whether the daemon's decisions follow from what it was told.
+std::string clearances_of(const FlightStory& story);
+std::string replay_of(const FlightStory& story);
 /// By what a stretch was judged, or why it was not; what came of a mapper's window, empty without one.
 std::string by_of(const JudgedStretch& stretch);
 std::string window_of(const JudgedMaps& maps);

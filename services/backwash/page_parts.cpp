@@ -5,7 +5,6 @@
 #include <sstream>
 
 #include "core/config/builtin_files.hpp"
-#include "core/report/recorded_tables.hpp"
 
 namespace backwash::services {
 namespace {
@@ -47,19 +46,6 @@ std::vector<std::pair<std::string, std::string>> parameter_files(const std::stri
   if (auto text = file_text(vehicle, ".vehicle.toml"); !text.empty()) files.emplace_back("Vehicle " + vehicle, text);
   if (auto text = file_text(model, ".model.toml"); !text.empty()) files.emplace_back("Model " + model, text);
   return files;
-}
-
-report::RecordedBeside recorded_beside(std::span<const log::RawRecord> log, const FlightStory& story,
-                                       std::int64_t zero_ns) {
-  const double zero_s = 1e-9 * static_cast<double>(zero_ns - report::first_tick_ns(log).value_or(zero_ns));
-  report::RecordedBeside beside;
-  beside.timeline = report::timeline_html(story.timeline, zero_s);
-  beside.sections = report::recorded_sections(log, zero_ns, beside.data);
-  for (auto mode : story.timeline.modes) {
-    mode.from_s -= zero_s, mode.until_s -= zero_s;
-    beside.data.modes.push_back(mode);
-  }
-  return beside;
 }
 
 }  // namespace backwash::services

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
-
-#include "core/report/recorded_flight.hpp"
-#include "core/report/recorded_tables.hpp"
+#include "core/report/recorded_map.hpp"
 #include "services/backwash/files.hpp"
-#include "services/backwash/flight_output.hpp"
 #include "services/backwash/flight_story_output.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/log_parts.hpp"
@@ -12,7 +8,6 @@
 #include "services/backwash/story_page.hpp"
 #include "services/backwash/verb.hpp"
 #include "services/backwash/world_cache.hpp"
-#include "version.hpp"
 
 namespace backwash::services {
 namespace {
@@ -24,19 +19,6 @@ struct ReportOptions {
   bool json = false, force = false;
   const std::string& log() const { return logs.front(); }
 };
-
-/// One take-off and one route, recorded to their end with the truth beside them, all of it in the log's last map: what
-/// `fly` flies.
-bool as_fly_flies(const log::RawLog& log, const FlightStory& story) {
-  const auto segments = std::ranges::count_if(
-      log.records, [](const log::RawRecord& r) { return r.header.kind == log::RecordKind::segment; });
-  // What a window showed is not in the log: the world of its sets cannot be made again.
-  const auto& maps = story.maps;
-  const bool in_last_map = !maps.stretches.empty() && std::ranges::all_of(maps.stretches, [&](const auto& s) {
-    return s.map == maps.accepted_s.size() && s.clearance_m;
-  });
-  return story.by_truth && segments == 2 && story.pieces.size() >= 2 && maps.window_clouds == 0 && in_last_map;
-}
 
 /// Any flight, by what the daemon recorded of it.
 int tell(const ReportOptions& options, std::span<const log::RawRecord> log, const FlightStory& story,
@@ -53,34 +35,7 @@ int tell(const ReportOptions& options, std::span<const log::RawRecord> log, cons
   }
   options.json ? print(to_json(story, options.log())) : print_text(story, options.log());
   if (story.ok()) return kOk;
-  std::string line;
-  for (const auto& reason : story.wrong) line += (line.empty() ? "" : "; ") + reason;
-  throw Failure(kFlightFailed, options.log() + ":1: " + line);
-}
-
-/// A flight such as `fly`'s: its sets are propagated again and must be those that were logged.
-int judge(const ReportOptions& options, const std::vector<log::RawRecord>& log, const log::FlightLog& truth,
-          const FlightStory& story) {
-  const auto [vehicle, model] = read_both(options.vehicle, options.model, options.risk);
-  const std::string model_path = model_of(options.vehicle, options.model);
-  const auto world = world_of({read_or_fail(report::recorded_map(log)), model, model_path, vehicle, options.vehicle});
-  const auto flight = read_or_fail(report::recorded_flight(log, truth, *world));
-  const Vec3 start = flight.take_off.samples.back().command.p_W, goal = flight.route.samples.back().command.p_W;
-  report::ReportContext context{options.log(),
-                                model_path,
-                                options.vehicle,
-                                kVersion,
-                                start,
-                                goal,
-                                {},
-                                1,
-                                own_command(),
-                                parameter_files(options.vehicle, model_path)};
-  context.parameters.emplace_back("As the daemon had them", report::recorded_configuration(log));
-  const auto zero_ns = report::first_tick_ns(log, report::first_segment(log));
-  const auto recorded = recorded_beside(log, story, zero_ns.value());
-  return conclude({flight, *world, context, sim::summarise(flight, *world, goal), &recorded}, options.out, options.json,
-                  options.force);
+  throw Failure(kFlightFailed, options.log() + ":1: " + why(story));
 }
 
 /// The truth of the flight, where it is given.
@@ -101,8 +56,7 @@ int run(const ReportOptions& options) {
   const auto map = report::recorded_map(log.records);
   const auto* grid = map ? &*map : nullptr;
   progress("reading the log");
-  const auto story = flight_story(log, vehicle.body.radius, truth ? &*truth : nullptr, options.because);
-  if (options.because.empty() && as_fly_flies(log, story)) return judge(options, log.records, *truth, story);
+  const auto story = flight_story(log, vehicle, truth ? &*truth : nullptr, options.because);
   return tell(options, log.records, story, grid, vehicle);
 }
 
@@ -127,7 +81,7 @@ Verb report_verb(Command& app) {
   command.add_flag("--force", options->force, "overwrite --out");
   command.footer(
       "Any raw log: several take-offs and routes, holds, refusals, one that never took off or was cut short.\n"
-      "The same judgement and exit codes as fly.\nExample:\n"
+      "Judged by the sets that the daemon judged by. The exit codes of fly.\nExample:\n"
       "  backwash report --log flight.bwlog --truth truth.csv --out flight.html");
   return {&command, [options] { return run(*options); }};
 }

@@ -60,7 +60,8 @@ report::DataTable clearance_table(const FlightStory& story) {
   return report::thinned(std::move(table));
 }
 
-report::Figure path_figure(const FlightStory& story, const report::DataTable& path, const map::OccupancyGrid* map) {
+report::Figure path_figure(const FlightStory& story, const report::DataTable& path, const map::OccupancyGrid* map,
+                           std::span<const report::Prism> tube) {
   Vec3 low = story.samples.front().p_W, high = low;
   for (const auto& s : story.samples) low = low.cwiseMin(s.p_W), high = high.cwiseMax(s.p_W);
   std::ostringstream data;
@@ -80,6 +81,10 @@ report::Figure path_figure(const FlightStory& story, const report::DataTable& pa
     cells = report::plot_cells();
   } else {
     data << "set size ratio -1\nset xlabel 'x, m'\nset ylabel 'y, m'\n";
+  }
+  if (!tube.empty()) {
+    data << report::outlines("tube", tube, 0);
+    cells += report::plot_band("tube", "#9cc6ec", "#4a8fce", "sets predicted");
   }
   data << "set key outside top center horizontal\nplot " << cells
        << "$flown using 3:4 with lines linewidth 1.5 linecolor '#888888' title 'commanded', $flown using 1:2 with "
@@ -102,26 +107,22 @@ std::vector<report::Section> sections_of(const FlightStory& story, std::span<con
                                          report::PageData& data) {
   std::vector<report::Section> sections;
   const auto path = path_table(story), clearance = clearance_table(story);
-  const auto error = report::recorded_error(log, report::first_tick_ns(log).value_or(0));
-  sections.push_back({"From above", basis(story), path_figure(story, path, map), {}, {"path"}});
+  const auto error = report::recorded_error(log, story.zero_ns);
+  sections.push_back({"From above", basis(story), path_figure(story, path, map, data.scene->tube), {}, {"path"}});
   if (world) {
     sections.push_back(report::field_section(way_of(story), *world));
     data.field = report::field_box(*world, report::field_view(world->grid, way_of(story)));
   }
   const auto add = [&](const report::DataTable& table, const char* title, const char* text,
                        std::vector<report::TimePlot> plots) {
-    if (table.rows.size() < 2) return;
-    data.tables.push_back(table);
-    data.plots.insert(data.plots.end(), plots.begin(), plots.end());
-    sections.push_back({title, text, report::plots_figure(table, plots), plots, {table.id}});
+    report::add_plots(sections, data, table, title, text, std::move(plots));
   };
   add(path, "Height", "Commands are drawn in the air alone.",
       {{"height", "path", "height", "m", {{"command_z_m", "commanded", "commanded"}, {"z_m", "flown", "flown"}}}});
   add(error, "Error between its bounds", "Measured position minus the predicted centre, as each tick logged it.",
       report::error_plots(false));
-  if (story.clearance_m)
-    add(clearance, "Clearance", "On the routes, body to the nearest obstacle.",
-        {{"clearance", "clearance", "clearance", "m", {{"clearance_m", "body to the nearest obstacle", "flown"}}}});
+  add(clearance, "Clearance", "On the routes, body to the nearest obstacle.",
+      {{"clearance", "clearance", "clearance", "m", {{"clearance_m", "body to the nearest obstacle", "flown"}}}});
   return sections;
 }
 
@@ -146,13 +147,18 @@ std::string figures_table(const FlightStory& s) {
   text += row("Take-offs / landings / holds / refused commands",
               std::to_string(s.take_offs) + " / " + std::to_string(s.landings) + " / " + std::to_string(s.holds) +
                   " / " + std::to_string(s.refusals));
-  text += row("Smallest clearance on the routes, body to obstacle",
-              s.clearance_m ? to_text(*s.clearance_m, 3) + " m" : "not judged: no map, or no route");
+  text += row("Clearances", clearances_of(s));
+  if (s.maps.not_judged + s.maps.not_judged_rising > 0)
+    text += row("Ticks without a clearance, on routes / take-offs",
+                std::to_string(s.maps.not_judged) + " / " + std::to_string(s.maps.not_judged_rising));
   if (s.maps.window_clouds > 0) text += row("Mapper's window", window_of(s.maps));
   text += row("Largest error over bound, x / y / z", to_text(s.largest_ratio.x(), 2) + " / " +
                                                          to_text(s.largest_ratio.y(), 2) + " / " +
                                                          to_text(s.largest_ratio.z(), 2));
   text += row("Samples inside", std::to_string(s.inside) + " of " + std::to_string(s.judged));
+  text += row("Decided again from what the daemon was told", replay_of(s));
+  if (s.beyond_truth > 0)
+    text += row("Ticks that the truth does not cover, judged as measured", std::to_string(s.beyond_truth));
   text += row("Records lost", std::to_string(s.records_lost));
   return text + "</table>\n</section>\n";
 }
@@ -189,15 +195,16 @@ std::string story_page(const FlightStory& s, std::span<const log::RawRecord> log
       report::escaped(s.ok() ? "Every goal reached, " + untouched(s.maps) + ", every sample inside its set."
                              : "Not good: " + why(s) + ".") +
       "</p>\n";
-  auto beside = recorded_beside(log, s, report::first_tick_ns(log).value_or(0));
-  page += beside.timeline;
+  page += report::timeline_html(s.timeline);
+  report::PageData data;
+  data.modes = s.timeline.modes;
   std::vector<report::Section> sections;
   if (!s.samples.empty()) {
-    beside.data.scene = scene_of(s, log, map, context.body_radius);
-    page += report::scene_html(*beside.data.scene);
-    sections = sections_of(s, log, map, context.world, beside.data);
+    data.scene = scene_of(s, log, map, context.body_radius);
+    page += report::scene_html(*data.scene);
+    sections = sections_of(s, log, map, context.world, data);
   }
-  sections.insert(sections.end(), beside.sections.begin(), beside.sections.end());
+  for (auto& section : report::recorded_sections(log, s.zero_ns, data)) sections.push_back(std::move(section));
   for (const auto& section : sections) {
     if (!section.drawing) throw Failure(kUnavailable, section.drawing.error().message);
     page += report::to_html(section);
@@ -205,7 +212,7 @@ std::string story_page(const FlightStory& s, std::span<const log::RawRecord> log
   page += figures_table(s) + pieces_table(s) + maps_table(s.maps);
   auto parameters = context.parameters;
   parameters.emplace_back("As the daemon had them", report::recorded_configuration(log));
-  const auto moved = report::interactive(beside.data, report::javascript_folders());
+  const auto moved = report::interactive(data, report::javascript_folders());
   page += report::parameters_html(own_command(), parameters) + moved.notes;
   return report::html_page("backwash flight", page, moved.scripts);
 }

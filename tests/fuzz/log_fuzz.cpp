@@ -8,7 +8,7 @@
 #include "core/log/dataflash.hpp"
 #include "core/log/tick_log.hpp"
 #include "core/log/ulog.hpp"
-#include "core/report/recorded_flight.hpp"
+#include "core/report/recorded_map.hpp"
 #include "tests/daemon/lockstep.hpp"
 #include "tests/fuzz/mutator.hpp"
 
@@ -86,70 +86,6 @@ TEST(Fuzz, ADamagedRawLogIsReplayedOrRefusedByItsByte) {
     if (log) (void)report::recorded_map(log->records);
   }
   EXPECT_GT(outcome.taken, 0u);
-}
-
-/// Records of a take-off and a route as the planner writes them, with ticks that agree, and two rows of truth.
-std::vector<log::RawRecord> flown(const plan::World& world) {
-  std::vector<log::RawRecord> log;
-  const auto record = [&](RecordKind kind, std::int64_t t_ns, const Bytes& bytes) {
-    log.push_back({{t_ns, kind, static_cast<std::uint32_t>(bytes.size())}, bytes});
-  };
-  for (std::uint64_t id = 1; id <= 2; ++id) {
-    const State start{Vec3(-2, 0, 1.2), Vec3::Zero()};
-    const std::vector<Setpoint> rows(20, Setpoint{start.p_W, Vec3::Zero(), Vec3::Zero(), 0});
-    log::SegmentRecord head{};
-    head.id = id, head.commands = rows.size() - 1;
-    std::copy_n(start.p_W.data(), 3, head.start_p);
-    Bytes segment;
-    append(segment, &head, sizeof head);
-    for (const auto& c : rows) {
-      const double v[10] = {c.p_W.x(), c.p_W.y(), c.p_W.z()};
-      append(segment, v, sizeof v);
-    }
-    record(RecordKind::segment, 0, segment);
-    const std::span commands(rows.begin() + 1, rows.end());
-    const auto tube = reach::tube_over_field(world.reach, start, rows[0], commands, world.bounds);
-    for (std::size_t k = 0; k < 22; ++k) {
-      log::TickRecord tick{};
-      tick.segment = id, tick.index = k, tick.judged = 1;
-      std::copy_n(tube[std::min(k, tube.size() - 1)].center.p_W.data(), 3, tick.center);
-      Bytes bytes;
-      append(bytes, &tick, sizeof tick);
-      record(RecordKind::tick, static_cast<std::int64_t>(20'000'000 * (k + 40 * id)), bytes);
-    }
-  }
-  return log;
-}
-
-TEST(Fuzz, ADamagedFlightIsPutTogetherOrRefused) {
-  Mutator mutator("recorded flight", 0.02);
-  const auto world = daemon::test::corridor();
-  const auto whole = flown(*world);
-  log::FlightLog truth;
-  truth.t_s = {0, 10};
-  for (const char* c : {"x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "ax_mps2", "ay_mps2", "az_mps2"})
-    truth.columns[c] = {0, 0};
-  ASSERT_TRUE(report::recorded_flight(whole, truth, *world))
-      << report::recorded_flight(whole, truth, *world).error().message;
-  Outcome outcome;
-  for (bool more = true; more;) {
-    auto log = whole;
-    std::size_t bytes = 0;
-    for (std::size_t n = 1 + mutator.below(3); n > 0; --n) {
-      // Every other one the head of a segment: there are but two.
-      const std::size_t at = mutator.one_in(2) ? mutator.below(2) * 23 : mutator.below(log.size());
-      log[at].bytes = mutator.damaged(log[at].bytes);
-      if (mutator.one_in(4)) log[at].bytes.resize(std::min(log[at].bytes.size(), mutator.below(300)));
-      bytes += log[at].bytes.size();
-    }
-    more = mutator.spend(bytes);
-    const auto flight = report::recorded_flight(log, truth, *world);
-    ++(flight ? outcome.taken : outcome.refused);
-    if (!flight) {
-      ASSERT_FALSE(flight.error().message.empty());
-    }
-  }
-  EXPECT_GT(outcome.refused, 0u);
 }
 
 TEST(Fuzz, ADamagedULogIsReadOrRefusedByItsByte) {

@@ -51,10 +51,10 @@ def main():
         kept = (flown["ok"] and status["samples_outside"] == 0 and status["samples_inside"] > 0 and replay["equal"])
         good = good and kept
         rows.append((name, status["samples_inside"], status["samples_outside"], max(flown["largest_error_over_bound"].values()),
-                     half[0], half[12], flown["planned_clearance_m"], flown["min_clearance_m"], kept))
+                     half[0], half[12], flown["set_clearance_m"], flown["min_clearance_m"], kept))
     if not rows:
         sys.exit("no flights in " + str(out))
-    print("| odometry | samples inside / outside | largest error over bound | half width across, first moving set, 0.24 s later, m | planned clearance, m | flown, m | |")
+    print("| odometry | samples inside / outside | largest error over bound | half width across, first moving set, 0.24 s later, m | left over by the sets, m | flown, m | |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     for name, inside, outside, share, first, later, planned, least, kept in rows:
         print(f"| {name} | {inside} / {outside} | {share:.2f} | {first:.4f}, {later:.4f} | {planned:.3f} | {least:.3f} | {'kept' if kept else 'FAILED'} |")

@@ -44,7 +44,13 @@ for name, page in (("failed'<b>", "failed"), ("ground", "ground")):
     assert ran.returncode == 1, ran.stderr
 PYTHON
 look() { node "$source_dir/tests/report/peer/look.cjs" "$modules" "$@" >"${1%.html}.json"; }
-look flight.html . 360,900,1600 5 10.5
+# Two times at which a position was judged.
+times=$(PYTHONPATH=$source_dir/tests/system python3 -c '
+import raw_log
+ticks = list(raw_log.ticks("flight.bwlog"))
+judged = [tick.t - ticks[0].t for tick in ticks if tick.judged]
+print(*(f"{judged[len(judged) * k // 3]:.2f}" for k in (1, 2)))')
+look flight.html . 360,900,1600 $times
 look simulated.html . 360,1600 5
 look failed.html . 360,1600 1
 look ground.html . 360,1600
@@ -97,7 +103,7 @@ for name in ("flight", "simulated", "told"):
     for cell, point in zip(some, asked, strict=True):
         bound = kappa * point["sigma"][5] ** 0.5 + mean
         assert bound * (1 - 1e-6) <= cell["vertical_bound_mps2"] <= bound * (1 + 6e-4), (name, cell, bound)
-    place = min(table(pages[name]["worked"]["files"]["path.csv"]), key=lambda row: abs(row["t_s"] - 5))
+    place = min(table(pages[name]["worked"]["files"]["path.csv"]), key=lambda row: abs(row["t_s"] - pages[name]["worked"]["cursors"][0]["t"]))
     here = float(re.search(r"([0-9.]+) m/s²", plane["here"])[1])
     near = [c["vertical_bound_mps2"] for c in table(plane["kinds"][0]["csv"]) if all(abs(c[a] - place[a]) < 0.051 for a in ("x_m", "y_m"))]
     assert abs(place["z_m"] - table(plane["kinds"][0]["csv"])[0]["z_m"]) > 0.06 or any(abs(here - bound) < 6e-3 for bound in near), (plane["here"], place, near)
@@ -107,9 +113,9 @@ assert "install Debian's libjs-dygraphs and libjs-three" in open("bare.html").re
 
 # What the log holds, by the reader of the system tests.
 ticks = [(t, struct.unpack_from("<3Q6I5fI34d2I", body)) for t, kind, body in raw_log.records("flight.bwlog") if kind == raw_log.TICK]
-first = next(struct.unpack_from("<Q", body)[0] for t, kind, body in raw_log.records("flight.bwlog") if kind == 9)
-zero = next(t for t, tick in ticks if tick[1] == first)
+zero = ticks[0][0]
 judged = [(t - zero, [tick[15 + a] - tick[31 + a] for a in range(3)], tick[34:37]) for t, tick in ticks if tick[6]]
+modes = [(t - zero, raw_log.MODES[tick[3]]) for t, tick in ticks]
 worked = pages["flight"]["worked"]
 
 
@@ -139,7 +145,8 @@ for cursor in worked["cursors"]:
     values = {column: text.replace("−", "-").lstrip("±") for _, *pairs in cursor["values"] for column, text in pairs}
     for axis, name in enumerate("xyz"):
         assert abs(float(values[f"error_{name}_m"]) - e[axis]) < 6e-5 and abs(float(values[f"bound_{name}_m"]) - h[axis]) < 6e-5, (values, e, h)
-    assert cursor["told"].startswith(f"{cursor['t']:.2f} s, tracking: "), cursor["told"]
+    mode = min(modes, key=lambda row: abs(row[0] - cursor["t"]))[1]
+    assert cursor["told"].startswith(f"{cursor['t']:.2f} s, {mode}: "), cursor["told"]
 page = open("failed.html").read()
 assert "<img src=x" not in page and "&lt;img src=x onerror=alert(1)&gt;" in page and "failed'&lt;b&gt;.bwlog" in page
 print({name: (page["bytes"], sorted(page["worked"]["files"])) for name, page in pages.items()})

@@ -33,7 +33,7 @@ class RawLog:
             self.record(AIR, struct.pack("<Q3d2I8d", self.number, *[0.03] * 3, CLASSES.index(where), 0, *factors, evidence, changed, 1))
         self.record(TICK_INPUT, struct.pack("<5q2Q29d2i2IIf", *[self.t] * 5, 0, 0, *[0.0] * 29, 0, 0, flags, 0, 0, 0.0))
         self.record(TICK, struct.pack("<3Q6I5fI34d2I", self.number, segment, index, MODES[mode], reason, 0, judged,
-                                      abs(error) <= 0.1, 0, 0, 0, 0, 0, 0, 0, *self.at, 0, 0, 0, *center, *[0.0] * 7,
+                                      abs(error) <= 0.1, 0, 0, 0, 0 if segment else -1, 0, 0, 0, *self.at, 0, 0, 0, *center, *[0.0] * 7,
                                       *center, *[0.1] * 5, *[0.0] * 10, 0, 0))
         self.t, self.number = self.t + 20_000_000, self.number + 1
 

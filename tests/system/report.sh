@@ -54,6 +54,11 @@ assert "judged by measured positions" in text and "4 " not in text.split("\n")[0
 open("truth.csv", "w").write("t_s,x_m,y_m,z_m\n" + "".join(f"{1 + 0.02 * k},9,9,9\n" for k in range(log.number)))
 story, said = told(log, 1, "--truth", "truth.csv")
 assert story["judged_by"] == "truth" and "was missed by" in story["reason"] and story["samples_inside"] == story["samples"]
+assert story["ticks_beyond_truth"] == 0
+# Where it ends early, what the vehicle measured is judged, and how much that is, is told.
+open("short.csv", "w").write("t_s,x_m,y_m,z_m\n" + "".join(f"{1.01 + 0.02 * k},9,9,9\n" for k in range(50)))
+story, said = told(log, 0, "--truth", "short.csv")
+assert story["ticks_beyond_truth"] == log.number - 55, story["ticks_beyond_truth"]  # for 0.1 s more the last row is near enough
 
 # One that never took off, by what was refused.
 log = RawLog()
@@ -262,10 +267,10 @@ log, chance = good_flight(), random.Random(20261123)
 ends = [19]
 while ends[-1] < len(log.bytes):
     ends.append(ends[-1] + 16 + struct.unpack_from("<I", log.bytes, ends[-1] + 12)[0])
-for cut in sorted(chance.sample(range(19, len(log.bytes)), 200)):
+for cut in [*range(19), *sorted(chance.sample(range(19, len(log.bytes)), 200))]:
     story, _ = told(log, None, most=cut)
-    whole = max(e for e in ends if e <= cut)
-    assert story["cut_at"] == (whole if whole < cut else None), (cut, story["cut_at"])
+    whole = max((e for e in ends if e <= cut), default=0)  # 0: not even the first line
+    assert story["cut_at"] == (whole if whole < max(cut, 1) else None), (cut, story["cut_at"])
     assert story["ok"] or story["reason"]
 told_at = [story["time_s"] for story in (told(log, None, most=n)[0] for n in ends[100::100])]
 assert told_at == sorted(told_at)
