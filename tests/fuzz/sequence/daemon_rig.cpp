@@ -81,6 +81,7 @@ void DaemonRig::start() {
   threads_.reset();
   late_.reset();
   std::filesystem::remove(log_);
+  clock_.emplace_back(daemon::now_ns(), lock_.now_ns());
   threads_ = std::make_unique<Threads>(*this, *lock_.channels);
   if (with_maps_) offer_map(room(), map::encode_octomap(room()));
   watch_.restarted();
@@ -116,6 +117,8 @@ void DaemonRig::advance() {
   read_switch();
   const std::uint64_t segment = lock_.view().segment;
   const auto& wire = lock_.tick(missed_);
+  clock_.emplace_back(daemon::now_ns(), lock_.now_ns());
+  truth_.emplace_back(lock_.now_ns(), lock_.autopilot->truth().p_W);
   const auto& view = lock_.view();
   ++spent_[static_cast<std::size_t>(view.mode)];
   Seen seen{tick_, view.mode, view.armed, view.offboard, wire.silent() ? 0 : wire.bytes};
@@ -192,6 +195,7 @@ void DaemonRig::run_mission() {
   while (const auto command = channels.commands.pop()) {
     const auto decision = threads_->mission.handle(*command, in.now_s);
     const bool done = carry_out(decision);
+    if (decision.answer) record(*command, *decision.answer);
     const bool decided = decision.order || decision.job;  // else it is an answer given once more
     if (done && decided && command->verb == backwash_msgs_msg_dds__COMMAND_STOP) watch_.stop_given(tick_);
     if (done && decided && decision.answer->result == backwash_msgs_msg_dds__ACK_ACCEPTED)
@@ -221,14 +225,43 @@ const Event* DaemonRig::lasting(Kind kind) const {
   return found != lasting_.end() && tick_ < found->second.tick + found->second.n ? &found->second : nullptr;
 }
 
-// The replay needs every segment that was offered: those are in the recorder's file.
-std::optional<std::string> DaemonRig::replayed() {
+// As services/backwashd's dds_front.cpp and daemon.cpp do.
+void DaemonRig::record(const daemon::CommandMessage& c, const daemon::Answer& a) {
+  char line[160];
+  std::snprintf(line, sizeof line, "%s %llu %u verb %u (%.3f, %.3f, %.3f) yaw %.3f writer 1", c.station.data(),
+                static_cast<unsigned long long>(c.session), c.sequence, c.verb, c.position.x(), c.position.y(),
+                c.position.z(), c.yaw);
+  threads_->recorder.append(log::RecordKind::command, line);
+  threads_->recorder.append(log::RecordKind::ack, std::string(c.station.data()) + " " + std::to_string(c.sequence) +
+                                                      " result " + std::to_string(a.result) + ": " + a.reason);
+}
+
+log::RawLog DaemonRig::logged() {
   threads_->recorder.drain(*lock_.channels);
-  auto log = log::read_raw_log(log_);
-  if (!log) return log.error().message;
-  std::erase_if(log->records, [](const auto& r) { return r.header.kind != log::RecordKind::offer; });
-  log->records.insert(log->records.end(), lock_.log.begin(), lock_.log.end());
-  const auto replay = log::replay(*log, "log");
+  auto log = log::read_raw_log(log_).value();
+  for (auto& record : log.records) {
+    const auto then = std::ranges::upper_bound(clock_, record.header.t_ns, {}, &decltype(clock_)::value_type::first);
+    record.header.t_ns = (then == clock_.begin() ? then : then - 1)->second;
+  }
+  const std::size_t others = log.records.size();
+  log.records.insert(log.records.end(), lock_.log.begin(), lock_.log.end());
+  std::vector<std::pair<std::int64_t, const log::RawRecord*>> order;  // the first two kinds are written at the start
+  for (std::size_t n = 0; n < log.records.size(); ++n) {
+    const auto& header = log.records[n].header;
+    const std::int64_t turn = 2 * (header.t_ns / 1'000'000'000) + (n < others);
+    order.emplace_back(header.kind == log::RecordKind::part        ? 0
+                       : header.kind == log::RecordKind::constants ? 1
+                                                                   : turn,
+                       &log.records[n]);
+  }
+  std::ranges::stable_sort(order, {}, &decltype(order)::value_type::first);
+  log::RawLog sorted;
+  for (const auto& [turn, record] : order) sorted.records.push_back(*record);
+  return sorted;
+}
+
+std::optional<std::string> DaemonRig::replayed() {
+  const auto replay = log::replay(logged(), "log");
   if (!replay) return replay.error().message;
   if (replay->ticks_missing > 0) return std::to_string(replay->ticks_missing) + " ticks are missing in the log";
   if (!replay->first) return std::nullopt;

@@ -38,8 +38,13 @@ class DaemonRig {
 
   /// Runs the events for so many ticks, or until something is violated.
   std::optional<Violation> run(int ticks);
-  /// The log of the last start, replayed: what differs, or nothing.
+  /// The log of the last start as a file of the daemon holds it: of each second what the control thread recorded, then
+  /// what the others did. Times are the rig's.
+  log::RawLog logged();
+  /// That log, replayed: what differs, or nothing.
   std::optional<std::string> replayed();
+  /// Where the vehicle was at each tick, of all starts, by the log's clock.
+  const std::vector<std::pair<std::int64_t, Vec3>>& truth() const { return truth_; }
   int ticks() const { return tick_; }
   int plans() const { return plans_; }
   /// From now on nothing but an operator disturbs the flight: each step of the set-point is judged, too.
@@ -71,6 +76,7 @@ class DaemonRig {
   void send(std::uint8_t verb, const Event& event);
   void run_mission();
   bool carry_out(const daemon::Decision& decision);
+  void record(const daemon::CommandMessage& command, const daemon::Answer& answer);
   void delay_segments();
   void look();
   void hear_autopilot();
@@ -101,6 +107,8 @@ class DaemonRig {
   bool restarts_ = false, with_maps_ = false, with_switch_ = false;
   std::unique_ptr<const track::AcceptedSegment> late_;
   std::array<long, kModes> spent_{};
+  std::vector<std::pair<std::int64_t, std::int64_t>> clock_;  // CLOCK_MONOTONIC, and the rig's time then
+  std::vector<std::pair<std::int64_t, Vec3>> truth_;
 };
 
 }  // namespace backwash::fuzz
