@@ -29,7 +29,7 @@ enum class RecordKind : std::uint32_t {
   frame_out = 7,      ///< one MAVLink frame handed to the port
   tick = 8,           ///< TickRecord
   segment = 9,      ///< SegmentRecord, then 10 doubles (p, v, a, yaw) for the command before it and for each of its own
-  constants = 10,   ///< ConstantsRecord
+  constants = 10,   ///< ConstantsRecord, and what was added to it
   tick_input = 11,  ///< TickInputRecord: what the next tick record was decided from
   offer = 12,       ///< OfferRecord …: a segment as it was offered to the control thread (core/log/tick_log.hpp)
   lost = 13,        ///< LostRecord: the disk did not take what came before
@@ -104,6 +104,13 @@ struct TimedConstantsRecord {
   ConstantsRecord constants;
   double rate_least, latency;  ///< Hz, s
 };
+/// In its place since a pose is held against its twist by a law that the log says (track::DriftLaw); before, it was
+/// track::kDriftOverASecond.
+struct DriftConstantsRecord {
+  TimedConstantsRecord timed;
+  double ends, deviations, scale, lag, over[3];
+};
+static_assert(sizeof(DriftConstantsRecord) == 112);
 
 /// What the updates of the air depend on beside their ticks (core/adapt/in_flight.hpp).
 struct AirConstantsRecord {
@@ -160,6 +167,12 @@ struct TickInputRecord {
   float position_sigma;  ///< m; 0: not known
 };
 static_assert(sizeof(TickInputRecord) == 312);
+/// In its place since decisions rest on what the odometry says of its velocity.
+struct StatedTickInputRecord {
+  TickInputRecord input;
+  double velocity_variance[3];  ///< (m/s)², body; zeros: it does not say
+};
+static_assert(sizeof(StatedTickInputRecord) == 336);
 
 /// A record as read back.
 struct RawRecord {

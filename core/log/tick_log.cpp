@@ -128,10 +128,12 @@ void each_member(Input& in, Record& r, const Direction& direction) noexcept {
 
 }  // namespace
 
-TickInputRecord encode(const track::TickInput& in) noexcept {
-  TickInputRecord r{};
-  r.segment = in.segment ? in.segment->id : 0;
-  each_member(in, r, ToRecord{r});
+StatedTickInputRecord encode(const track::TickInput& in) noexcept {
+  StatedTickInputRecord r{};
+  r.input.segment = in.segment ? in.segment->id : 0;
+  each_member(in, r.input, ToRecord{r.input});
+  if (in.odometry && in.odometry->velocity_variance)
+    std::copy_n(in.odometry->velocity_variance->data(), 3, r.velocity_variance);
   return r;
 }
 
@@ -146,11 +148,24 @@ void decided(const track::FlightTick& flight, const track::TickOutput& out, Tick
   each_decision(kDecisions, [&](const auto& decision) { decision.write(Decided{flight, out}, r); });
 }
 
-TimedConstantsRecord constants(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing) noexcept {
-  return {{vehicle.limits.v_max, vehicle.estimation.position, vehicle.initial_error.position,
-           vehicle.initial_error.velocity, battery_land},
-          timing.rate_least,
-          timing.latency};
+track::TickInput decode(const StatedTickInputRecord& r, const track::AcceptedSegment* segment) noexcept {
+  track::TickInput in = decode(r.input, segment);
+  const Vec3 said(r.velocity_variance[0], r.velocity_variance[1], r.velocity_variance[2]);
+  if (in.odometry && !said.isZero(0)) in.odometry->velocity_variance = said;
+  return in;
+}
+
+DriftConstantsRecord constants(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing,
+                               const track::DriftLaw& law) noexcept {
+  return {{{vehicle.limits.v_max, vehicle.estimation.position, vehicle.initial_error.position,
+            vehicle.initial_error.velocity, battery_land},
+           timing.rate_least,
+           timing.latency},
+          law.ends,
+          law.deviations,
+          law.scale,
+          law.lag,
+          {law.over[0], law.over[1], law.over[2]}};
 }
 
 }  // namespace backwash::log

@@ -24,16 +24,18 @@ enum Asked : std::uint32_t {
 };
 
 /// Real-time: wait-free, no allocation.
-TickInputRecord encode(const track::TickInput& in) noexcept;
-/// The same input again, bit for bit, but for the segment, which is the caller's.
+StatedTickInputRecord encode(const track::TickInput& in) noexcept;
+/// The same input again, bit for bit, but for the segment, which is the caller's. Of a record as they were before, its
+/// odometry says nothing of its velocity.
 track::TickInput decode(const TickInputRecord& record, const track::AcceptedSegment* segment) noexcept;
+track::TickInput decode(const StatedTickInputRecord& record, const track::AcceptedSegment* segment) noexcept;
 
 /// Writes what was decided into the record; times, counters and what was really sent are left as they are. Real-time:
 /// wait-free, no allocation.
 void decided(const track::FlightTick& flight, const track::TickOutput& out, TickRecord& record) noexcept;
 
-/// Of the usual timing its `constants` alone are the record.
-TimedConstantsRecord constants(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing) noexcept;
+DriftConstantsRecord constants(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing,
+                               const track::DriftLaw& law = {}) noexcept;
 
 /// A segment with its sets and stops as bytes of an `offer` record, and back. Error: bad_data if sizes disagree.
 std::vector<std::uint8_t> encode(const track::AcceptedSegment& segment);

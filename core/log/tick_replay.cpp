@@ -135,9 +135,15 @@ tl::expected<track::FlightTick, LogError> tick_of(const RawLog& log, const std::
   vehicle.initial_error = {constants->initial_position, constants->initial_velocity};
   const auto* timed = payload<TimedConstantsRecord>(**first);
   const OdometryTiming timing = timed ? OdometryTiming{timed->rate_least, timed->latency} : OdometryTiming{};
+  const auto* by = payload<DriftConstantsRecord>(**first);
+  const track::DriftLaw law =
+      by ? track::DriftLaw{by->ends, by->deviations, by->scale, by->lag, {by->over[0], by->over[1], by->over[2]}}
+         : track::kDriftOverASecond;
   // Written so that what is no number is refused: of a damaged record no window or limit is made.
   if (!(timing.rate_least > 0 && timing.latency >= 0)) return bad(at(name, **first) + "is no timing of odometry");
-  return track::FlightTick(vehicle, constants->battery_land, timing);
+  if (!std::ranges::all_of(law.over, [](double s) { return s > 0; }) || !(law.scale >= 0 && law.lag >= 0))
+    return bad(at(name, **first) + "is no law of a pose and its twist");
+  return track::FlightTick(vehicle, constants->battery_land, timing, law);
 }
 
 }  // namespace
@@ -197,10 +203,12 @@ tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name
   result.segments = segments->size();
   result.state_hash = 0xcbf29ce484222325u;
   const TickInputRecord* input = nullptr;
+  const StatedTickInputRecord* stated = nullptr;  // the same, of a newer log
   ReplayedAir air;
   for (const RawRecord& record : log.records) {
     if (record.header.kind == RecordKind::tick_input) {
       input = payload<TickInputRecord>(record);
+      stated = payload<StatedTickInputRecord>(record);
       if (!input) return bad(at(name, record) + "is too short for the inputs of a tick");
     }
     if (const auto wrong = air.take(record)) return bad(at(name, record) + *wrong);
@@ -219,7 +227,7 @@ tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name
       segment = found->second.get();
     }
     TickRecord replayed{};
-    const track::TickInput in = decode(*input, segment);
+    const track::TickInput in = stated ? decode(*stated, segment) : decode(*input, segment);
     const track::TickOutput out = flight.step(in);
     decided(flight, out, replayed);
     input = nullptr;

@@ -24,11 +24,11 @@ bool finite(const Setpoint& s) noexcept {
 
 }  // namespace
 
-FlightTick::FlightTick(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing)
+FlightTick::FlightTick(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing, const DriftLaw& law)
     : battery_land_(battery_land),
       sigma_(vehicle.estimation.position),
       timing_(timing),
-      gate_(vehicle, timing),
+      gate_(vehicle, timing, law),
       alignment_(timing),
       supervisor_(timing),
       tracker_(Setpoint{}, vehicle) {}

@@ -98,8 +98,9 @@ class FlightTick {
   /// the millimetre, and one that knows nothing excuses nothing.
   static constexpr double kLeastApart = 0.10, kMostApart = 0.25;
 
-  /// `battery_land`: remaining share below which LAND is asked for once; 0: never. `timing`: of the odometry.
-  FlightTick(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing = {});
+  /// `battery_land`: remaining share below which LAND is asked for once; 0: never. `timing`: of the odometry. `law`: of
+  /// its pose against its twist.
+  FlightTick(const Vehicle& vehicle, double battery_land, const OdometryTiming& timing = {}, const DriftLaw& law = {});
 
   /// One tick. Real-time: wait-free, no allocation.
   TickOutput step(const TickInput& in) noexcept;

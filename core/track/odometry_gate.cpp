@@ -33,20 +33,22 @@ OdometrySample moved(const RigidShift& D, OdometrySample sample) noexcept {
 bool OdometryGate::jumps(const OdometrySample& sample, double dt) const noexcept {
   const Vec3 predicted = last_->state.p_W + dt * last_->state.v_W;
   if (!((sample.state.p_W - predicted).norm() <= v_max_ * dt + 3 * sigma_)) return true;
-  const double sigma_v = sigma_ / kSettle;
+  const double sigma_v = sigma_ / PoseDrift::kSettle;
   if (!((sample.state.v_W - last_->state.v_W).norm() <= kMaxAcceleration * dt + kVelocityNoises * sigma_v)) return true;
   if (!(std::abs(wrap_angle(heading(sample.q) - heading(last_->q))) <= kMaxYawRate * dt + kAngleNoise)) return true;
   return !(angle_between(up_in_body(sample.q), up_in_body(last_->q)) <= kMaxTiltRate * dt + kAngleNoise);
 }
 
-// Two errors of the position and a third for the noise between; and the velocity's own over the time.
+// What an estimator says of its twist counts as it says it: one that boasts is still granted estimation.position.
 bool OdometryGate::contradicts(const OdometrySample& sample, double dt) noexcept {
-  const Vec3 claimed = dt / 2 * (last_->state.v_W + sample.state.v_W);
-  Vec3 drift = std::exp(-dt / kConsistentOver) * drift_ + (sample.state.p_W - last_->state.p_W - claimed);
-  if (dt > longest_step_) drift = Vec3::Zero();
-  if (!(drift.norm() <= 3 * sigma_ + sigma_ / kSettle * kConsistentOver)) return true;
-  drift_ = drift;
-  return false;
+  if (dt > longest_step_) {
+    drift_.begin_anew();
+    return false;
+  }
+  const auto& said = sample.velocity_variance;
+  return !drift_.explains({dt, sample.state.p_W - last_->state.p_W, dt / 2 * (last_->state.v_W + sample.state.v_W),
+                           sample.state.v_W - last_->state.v_W,
+                           said ? std::sqrt(said->maxCoeff()) : PoseDrift::velocity_error(sigma_)});
 }
 
 void OdometryGate::time(const OdometrySample& sample, bool clock_was_set) noexcept {
@@ -92,7 +94,7 @@ OdometryGate::Verdict OdometryGate::take(const OdometrySample& sample, bool movi
 void OdometryGate::rebase(const RigidShift& D) noexcept {
   if (!last_) return;
   last_ = moved(D, *last_);
-  drift_ = D.rotate(drift_);
+  drift_.rebase(D);
 }
 
 }  // namespace backwash::track

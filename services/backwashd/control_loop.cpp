@@ -48,8 +48,7 @@ ControlLoop::ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& lin
       line_allowed_(firmware_bridge::line_allowed(vehicle, link.untold_delay())) {
   link_.tap(&ControlLoop::on_frame, this);
   const auto constants = log::constants(vehicle, battery_land, timing);
-  record(log::RecordKind::constants, now_ns(), &constants,
-         timing.usual() ? sizeof constants.constants : sizeof constants);
+  record(log::RecordKind::constants, now_ns(), &constants, sizeof constants);
   if (!air) return;
   air_.emplace(*air);
   view_.air.emplace().factors = air_->factors();

@@ -50,6 +50,7 @@ DdsFront::DdsFront(const config::Daemon& config, int priority, const Vehicle& ve
       name_space_(config.dds.name_space),
       localization_(config, vehicle.estimation.position),
       check_(config.odometry.twist, config.odometry.timing),
+      drift_(config.odometry.twist, vehicle.estimation.position),
       refusals_(channels.refused),
       malformed_({{config.dds.odometry_topic, &channels.odometry_refused},
                   {topic_of<dds::Octomap>(config), &channels.maps_rejected},
@@ -107,6 +108,8 @@ void DdsFront::take_odometry(const dds::Odometry& m, const dds::Guid& writer) {
   if (!sample) return refusals_.add(channels_.odometry_refused, [&] { return sample.error(); });
   tell_closures();
   if (odometry_writer_.bind(writer)) spdlog::info("odometry is taken from writer {}", dds::text(writer));
+  if (const auto told = drift_.look(*sample))
+    spdlog::log(told->warns ? spdlog::level::warn : spdlog::level::info, "{}", told->line);
   channels_.odometry.write(*sample);
   if (!channels_.poses.push(*sample))
     refusals_.add(poses_lost_, [] { return "a pose to place scans by: 512 others wait for the map reader"; });

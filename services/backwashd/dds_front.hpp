@@ -12,6 +12,7 @@
 #include "services/backwashd/allowance.hpp"
 #include "services/backwashd/bound_writer.hpp"
 #include "services/backwashd/channels.hpp"
+#include "services/backwashd/drift_notice.hpp"
 #include "services/backwashd/localization.hpp"
 #include "services/backwashd/mission.hpp"
 #include "services/backwashd/odometry_check.hpp"
@@ -61,6 +62,7 @@ class DdsFront {
   std::string name_space_;
   Localization localization_;
   OdometryCheck check_;
+  DriftNotice drift_;
   Refusals refusals_;
   std::atomic<std::uint64_t> poses_lost_{0};
   BoundWriter odometry_writer_{"odometry"}, closure_writer_{"a loop closure"};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The VIO and the mapper beside a real autopilot in its simulator: the simulator's truth, placed in a map, becomes
 // odometry with noise on DDS; the map is published; the truth is logged and held against the map.
-// Faults come as lines of standard input: stop, go, freeze, jump X Y Z (m), turn YAW (rad). So does what the map does
-// not have: crate X Y Z EDGE (m), scanned at 10 Hz from then on.
+// Faults come as lines of standard input: stop, go, freeze, jump X Y Z (m), turn YAW (rad), drift X Y Z (m/s). So does
+// what the map does not have: crate X Y Z EDGE (m), scanned at 10 Hz from then on.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -47,6 +47,8 @@ struct Fault {
   Vec3 jump = Vec3::Zero();  // map frame
   double turn = 0;           // about the place where it began
   Vec3 pivot = Vec3::Zero();
+  Vec3 drift = Vec3::Zero();  // m/s, of the pose alone
+  std::int64_t drifts_from_ns = 0;
   std::optional<Truth> frozen;
 };
 
@@ -126,6 +128,8 @@ class Vio {
       if (verb == "go") fault_ = {};
       if (verb == "freeze") fault_.frozen = last_;
       if (verb == "jump") in >> fault_.jump.x() >> fault_.jump.y() >> fault_.jump.z();
+      if (verb == "drift")
+        in >> fault_.drift.x() >> fault_.drift.y() >> fault_.drift.z(), fault_.drifts_from_ns = last_.at_ns;
       if (verb == "turn") in >> fault_.turn, fault_.pivot = in_map(last_).p;
       if (Crate c; verb == "crate" && in >> c.center_W.x() >> c.center_W.y() >> c.center_W.z() >> c.edge) crate_ = c;
       std::cout << "fault " << verb << " at " << last_.at_ns << std::endl;
@@ -176,7 +180,9 @@ class Vio {
     std::normal_distribution<double> normal(0, o_.noise);
     const auto noise = [&] { return Vec3(normal(random_), normal(random_), normal(random_)); };
     const Eigen::Quaterniond turn(Eigen::AngleAxisd(fault_.turn, Vec3::UnitZ()));
-    p = {fault_.pivot + turn * (p.p - fault_.pivot) + fault_.jump + noise(), turn * p.v + 5 * noise(), turn * p.q};
+    const Vec3 drifted = static_cast<double>(at_ns - fault_.drifts_from_ns) * 1e-9 * fault_.drift;
+    p = {fault_.pivot + turn * (p.p - fault_.pivot) + fault_.jump + drifted + noise(), turn * p.v + 5 * noise(),
+         turn * p.q};
     dds::Odometry m{};
     m.header.stamp = bench::stamp(static_cast<double>(at_ns) * 1e-9);
     m.header.frame_id = dds::c_string(frame);

@@ -122,6 +122,53 @@ TEST_F(Replay, NamesTheByteOfWhatIsDamaged) {
   EXPECT_EQ(cut.records.size() + 1, log.records.size());
 }
 
+/// The log as it was written before a pose was held against its twist by a law that the log says.
+log::RawLog as_before(log::RawLog log) {
+  for (auto& r : log.records) {
+    if (r.header.kind == RecordKind::constants) r.bytes.resize(sizeof(log::ConstantsRecord));
+    if (r.header.kind == RecordKind::tick_input) r.bytes.resize(sizeof(log::TickInputRecord));
+  }
+  return log;
+}
+
+TEST_F(Replay, OfALogThatNamesNoLawIsTheSameWhereNothingDrifted) {
+  const auto replayed = log::replay(as_before(read()), path_);
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_EQ(replayed->ticks, ticks_);
+  EXPECT_EQ(replayed->differing, 0u);
+}
+
+// By the law of before, which a log that names none was decided by, this drift is flown on.
+TEST(ReplayOfADrift, IsHeldByTheLawThatTheLogNamesAlone) {
+  Lockstep rig;
+  rig.take_off();
+  double drifted = 0;
+  rig.spoil = [&](OdometrySample& s) {
+    s.state.p_W.x() += drifted += 0.05 * kControlPeriod;
+    s.velocity_variance = Vec3::Constant(1e-4);
+  };
+  const int ticks = rig.ticks_until(Mode::hold, 400);
+  ASSERT_GT(ticks, 60);
+  ASSERT_EQ(rig.reason(), Reason::odometry_inconsistent);
+  const auto held = rig.view().ticks - 1;
+  rig.ticks(5);
+  const std::string path = testing::TempDir() + "drift_" + std::to_string(::getpid()) + ".bwlog";
+  rig.save(path);
+  const auto log = log::read_raw_log(path).value();
+  std::filesystem::remove(path);
+  const auto now = log::replay(log, path), before = log::replay(as_before(log), path);
+  ASSERT_TRUE(now && before);
+  EXPECT_EQ(now->differing, 0u) << now->first->field;
+  ASSERT_TRUE(before->first);
+  EXPECT_EQ(before->first->tick, held);
+  EXPECT_EQ(before->first->field, "mode");
+  // What it says of its velocity decides too: without it the hold comes later.
+  auto unstated = log;
+  for (auto& r : unstated.records)
+    if (r.header.kind == RecordKind::tick_input) r.bytes.resize(sizeof(log::TickInputRecord));
+  EXPECT_GT(log::replay(unstated, path)->differing, 0u);
+}
+
 TEST_F(Replay, CountsTicksThatTheLogHasLost) {
   auto log = read();
   std::size_t seen = 0;

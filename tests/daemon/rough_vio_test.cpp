@@ -8,6 +8,7 @@
 #include <numbers>
 #include <random>
 
+#include "tests/daemon/eights.hpp"
 #include "tests/daemon/lockstep.hpp"
 
 namespace backwash::daemon::test {
@@ -42,26 +43,6 @@ class RoughVio {
   std::mt19937_64 rng_;
   std::normal_distribution<double> normal_;
 };
-
-/// Back to `home` within 4 s, then figures of eight before it at up to 1.4 m/s and 1.9 m/s², the heading turning at up
-/// to 1 rad/s.
-std::vector<Setpoint> eights(const Setpoint& from, const Vec3& home, double seconds) {
-  std::vector<Setpoint> commands;
-  const Vec3 way = home - from.p_W;
-  for (double t = 0; t < 4; t += kControlPeriod) {
-    const double s = t / 4, v = 30 * s * s * (1 - s) * (1 - s) / 4, a = 60 * s * (1 - s) * (1 - 2 * s) / 16;
-    commands.push_back({from.p_W + s * s * s * (10 - 15 * s + 6 * s * s) * way, v * way, a * way, from.yaw});
-  }
-  for (double t = 0; t < seconds; t += kControlPeriod) {
-    const auto swing = [t](double amplitude, double omega) {  // from rest
-      const double s = std::sin(omega * t), c = std::cos(omega * t);
-      return std::array{amplitude * (1 - c), amplitude * omega * s, amplitude * omega * omega * c};
-    };
-    const auto x = swing(1.1, 1.25), y = swing(0.15, 2.5), z = swing(0.2, 0.7), yaw = swing(1.2, 0.8);
-    commands.push_back({home + Vec3(x[0], y[0], z[0]), {x[1], y[1], z[1]}, {x[2], y[2], z[2]}, from.yaw + yaw[0]});
-  }
-  return commands;
-}
 
 // More than 20 minutes: eleven flights, each with five stops out of full motion, which tilt the vehicle at up to 13
 // rad/s.

@@ -180,17 +180,18 @@ TEST(SlowOdometry, AnErrorOutsideItsSetIsAHoldTwoTicksAfterItsSample) {
   EXPECT_EQ(rig.reason(), Reason::outside_set) << to_string(rig.reason());
 }
 
-TEST(SlowOdometry, OfTheUsualTimingTheLogIsAsItWas) {
+TEST(SlowOdometry, TheLogSaysTheTimingThatItWasDecidedBy) {
   Lockstep rig;
   rig.ticks(2);
   Rig slow({5, 0, 0}, k10Hz);
-  const auto constants = [](const Lockstep& of) {
+  const auto timing = [](const Lockstep& of) {
     for (const auto& r : of.log)
-      if (r.header.kind == log::RecordKind::constants) return r.bytes.size();
-    return std::size_t{0};
+      if (const auto* c = log::payload<log::DriftConstantsRecord>(r); r.header.kind == log::RecordKind::constants && c)
+        return OdometryTiming{c->timed.rate_least, c->timed.latency};
+    return OdometryTiming{0, 0};
   };
-  EXPECT_EQ(constants(rig), 5 * sizeof(double));
-  EXPECT_EQ(constants(slow), 7 * sizeof(double));
+  EXPECT_TRUE(timing(rig).usual());
+  EXPECT_EQ(timing(slow).rate_least, k10Hz.rate_least);
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ RawLog told(std::int64_t first_ns, int ticks) {
     track::AutopilotFacts::Pose pose;
     pose.at_ns = in.now_ns, pose.state.p_W = {2e-9 * static_cast<double>(in.now_ns), 1, 2};
     if (n % 2 == 0) in.autopilot.pose = pose;
-    const TickInputRecord row = encode(in);
+    const TickInputRecord row = encode(in).input;
     RawRecord record{{in.now_ns, RecordKind::tick_input, sizeof row}, std::vector<std::uint8_t>(sizeof row)};
     std::memcpy(record.bytes.data(), &row, sizeof row);
     log.records.push_back(std::move(record));
@@ -61,7 +61,7 @@ TEST(AutopilotFlight, OfAnotherFlightFromTheSamePadIsFarInTheAir) {
     std::memcpy(&row, record.bytes.data(), sizeof row);
     auto in = decode(row, nullptr);
     if (in.autopilot.pose) in.autopilot.pose->state.p_W.x() = std::max(0.0, 1e-9 * static_cast<double>(in.now_ns) - 50);
-    row = encode(in);
+    row = encode(in).input;
     std::memcpy(record.bytes.data(), &row, sizeof row);
   }
   auto still = logged(0, 3000, Vec3::Zero());
