@@ -171,7 +171,8 @@ TEST(SlowOdometry, AnErrorOutsideItsSetIsAHoldTwoTicksAfterItsSample) {
   Rig rig({5, 0, 0}, k10Hz);
   rig.take_off();
   rig.start_route(2);
-  rig.vio.spoil = [&](OdometrySample& s) { s.state.p_W.y() += 0.08; };  // no jump, no contradiction
+  // No jump, no contradiction: the twist tells of the way.
+  rig.vio.spoil = [&](OdometrySample& s) { s.state.p_W.y() += 0.08, s.state.v_W.y() += 1.5; };
   const std::uint64_t before = rig.view().outside;
   int n = 0;
   for (; n < 6 && rig.view().outside == before; ++n) rig.tick();

@@ -83,7 +83,8 @@ TEST(VioDriftFault, APoseThatDriftsAwayFromItsTwistIsHeldWithinSeconds) {
         if (rate < 0.02 && !stated) continue;  // no faster than what is explained for ever
         ASSERT_TRUE(held) << rate;
         EXPECT_GT(*held, 0) << "held without a drift";
-        // A scale and a lag that are granted cost a flight's 2 cm/s two seconds; who states its twist has them to spare.
+        // A scale and a lag that are granted cost a flight's 2 cm/s two seconds; who states its twist has them to
+        // spare.
         const double more = flies && !stated ? 5 : 0;
         EXPECT_LE(*held, within + more) << rate << (flies ? ", flown" : ", at rest");
       }
