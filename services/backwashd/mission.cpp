@@ -195,10 +195,8 @@ Decision Mission::enable() {
     return refused(
         "the autopilot's estimator says that it takes its position from no sensor: it does not follow the VIO");
   if (const double allowed = firmware_bridge::line_allowed(vehicle_, view_.untold_delay); view_.round_trip > allowed)
-    return refused(
-        formatted("the line to the autopilot takes %.3f s there and back, and the sets allow for %.3f s: "
-                  "latency and feedback_delay of the vehicle file",
-                  *view_.round_trip, allowed));
+    return refused(formatted("the line takes %.3f s there and back, and the vehicle file's latencies allow for %.3f s",
+                             *view_.round_trip, allowed));
   if (!world_->grid.inside(world_->grid.index(view_.state.p_W))) return refused("the vehicle is outside the map");
   const std::string forbids =
       firmware_bridge::forbidding_parameter(*view_.autopilot, view_.parameters, vehicle_, view_.untold_delay);
@@ -237,8 +235,7 @@ Decision Mission::fly(std::deque<Goal> route) {
   return decision;
 }
 
-/// Whether the vehicle flies in the mode in which it follows set-points, and nobody sends any: of a daemon that died,
-/// or went quiet.
+/// It flies in the mode that follows set-points, and nobody sends any: of a daemon that died, or went quiet.
 bool Mission::abandoned() const {
   return (view_.mode == Mode::passive || view_.mode == Mode::quiet) && view_.armed && view_.offboard;
 }
@@ -263,9 +260,8 @@ Decision Mission::stop(const CommandMessage& command) {
   const bool pending = order_under_way();
   const bool standing = view_.landed.value_or(false) && !view_.armed;
   const Mode mode = view_.mode;
-  Decision decision = order(Request::stop, abandoned() ? "landing: nothing is verified to stop on"
-                                           : standing  ? "disabling"
-                                                       : "stopping");
+  const char* const alone = abandoned() ? "landing: no stop is verified" : "stopping";
+  Decision decision = order(Request::stop, standing ? "disabling" : alone);
   if (mode == Mode::land) decision.answer = {kRefused, "landing: the autopilot lands, and ends that by itself"};
   if (idle && !pending && !abandoned()) decision.answer = {kRefused, "not enabled"};
   if (decision.answer->result == kAccepted) accepted_ = {command.session, command.sequence};
