@@ -254,6 +254,7 @@ bool AutopilotLink::send_statustext(std::uint8_t severity, std::string_view text
 }
 
 bool AutopilotLink::send_parameter_request(std::size_t rule) noexcept {
+  if (rule >= telemetry_.autopilot().rules.size()) return false;
   const std::string_view name = telemetry_.ask(rule);
   mavlink::ParamRequestRead m{
       .param_index = -1, .target_system = heard_.value_or(0), .target_component = kFlightController, .param_id = {}};

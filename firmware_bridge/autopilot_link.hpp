@@ -127,7 +127,8 @@ class AutopilotLink {
   /// place does where there is no GPS: this one is in Zurich.
   bool send_origin() noexcept;
 
-  /// Asks for the parameter of this rule of telemetry().autopilot(); Telemetry::parameters() has the answer.
+  /// Asks for the parameter of this rule of telemetry().autopilot(); Telemetry::parameters() has the answer. False
+  /// also where it has no such rule.
   bool send_parameter_request(std::size_t rule) noexcept;
 
   /// Forgets what waits to be sent, here and in the kernel: QUIET means that not even an old set-point follows.

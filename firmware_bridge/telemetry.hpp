@@ -126,7 +126,7 @@ class Telemetry {
   /// kHeartbeatTimeout, or when its clock is more than a second back, it may have restarted with other values, and none
   /// is; nor is one whose newest value is no number.
   const ParameterValues& parameters() const noexcept { return parameters_; }
-  /// The name by which the parameter of this rule is to be asked for now; counts the question.
+  /// The name by which the parameter of this rule of autopilot() is to be asked for now; counts the question.
   std::string_view ask(std::size_t rule) noexcept;
 
   void take(const mavlink::Heartbeat& m, Time now) noexcept;

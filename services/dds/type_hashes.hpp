@@ -49,7 +49,7 @@ inline constexpr TypeHash kTypeHashes[] = {
     {"backwash_msgs::msg::dds_::Timing_", "RIHS01_2145ee542663a02c6d70bc306afe089bceb7d5cf68cb6823bbb04492929701b1"},
     {"backwash_msgs::msg::dds_::Parameter_", "RIHS01_4ba17b7cf55cf1a35b445d08fd2a8abc23c15955f4395e7be5df7c1eeb3107af"},
     {"backwash_msgs::msg::dds_::Advice_", "RIHS01_17c2f1c681685b8a1ac5ddca49bb02442a51bd1c887fe5debfe06ab08eb441c2"},
-    {"backwash_msgs::msg::dds_::Status_", "RIHS01_fbacb3292a04c8dce16506acc7d98738977766c8df83dc8ea22377065046811d"},
+    {"backwash_msgs::msg::dds_::Status_", "RIHS01_ebf190b7637ef3c619046ce4f2323be8fc5168f866711e4e1d4859250022cd8a"},
     {"backwash_msgs::msg::dds_::ReachStep_", "RIHS01_eb1cf8bae007f124aced5c5d7111a2856f049f00ff8db1583041a39701ef0aa2"},
     {"backwash_msgs::msg::dds_::ReachTube_", "RIHS01_205e5a736e8e66742da3743c25961c8bcef8edc4bc08b1c7f503e3f980520ebd"},
     {"backwash_msgs::msg::dds_::MapPart_", "RIHS01_f721a090fccf137d5acd86d8d436fb0eeb0aaab7c3f33afd575a5e0e4dcbfb68"},
