@@ -72,7 +72,7 @@ constexpr ParameterRule kRules[] = {
      told,
      one_of,
      any_of({0}),
-     "to 0 (the height at the time, but 2 m): otherwise the pilot's RTL first climbs to it, ceiling or not"},
+     "to 0 (the height at the time): otherwise the pilot's RTL first climbs to it, ceiling or not"},
     {{{"BATT_FS_LOW_ACT"}}, told, one_of, any_of({0, 1, 7}), kBattery},
     {{{"BATT_FS_CRT_ACT"}}, told, one_of, any_of({0, 1, 7}), kBattery},
     {{{"PSC_VELXY_I"}, {"PSC_NE_VEL_I"}}, file, k_i_horizontal},
