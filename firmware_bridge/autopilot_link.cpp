@@ -150,9 +150,9 @@ void AutopilotLink::take_frame(const mavlink::Frame& frame, Time now) noexcept {
 template <class Message>
 Time AutopilotLink::taken(const Message& m, Time now) const noexcept {
   if constexpr (requires { m.time_boot_ms; }) {
-    constexpr std::int64_t kPerMillisecond = 1'000'000;
+    constexpr std::int64_t kLongestTrip_ns = 10'000'000, kPerMillisecond = 1'000'000;
     const auto clock = offset_.at(now);
-    if (!clock) return now;
+    if (!clock || clock->value.round_trip_ns > kLongestTrip_ns) return now;
     const auto there_ms = static_cast<std::uint32_t>((nanoseconds_of(now) + clock->value.offset_ns) / kPerMillisecond);
     const auto age_ms = static_cast<std::int32_t>(there_ms - m.time_boot_ms);  // its 32 bits wrap after 49 days
     return age_ms > 0 ? now - milliseconds(age_ms) : now;

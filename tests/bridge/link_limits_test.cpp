@@ -78,10 +78,9 @@ TEST_F(StampTest, OfAClockThatWasMeasuredLongAgoNoAgeIsTaken) {
   EXPECT_EQ(link_.telemetry().local_state.age(now), Time::duration::zero());
 }
 
-// On a line that has become slow the stamps are what tells of it.
-TEST_F(StampTest, OfAClockThatIsKnownByALongTripTheAgeIsGoodToHalfOfIt) {
+TEST_F(StampTest, OfAClockThatIsNotKnownWellNoAgeIsTaken) {
   measure(11ms);
-  EXPECT_NEAR(counted_ms(60), 60, 6);
+  EXPECT_EQ(counted_ms(60), 0);
 }
 
 TEST_F(StampTest, AnotherPortIsAnotherClock) {
