@@ -52,7 +52,7 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   telemetry_ = Telemetry(known_);
   queue_.clear();
   budget_.forget();
-  clock_ = {}, offset_ = {}, trips_ = {};
+  clock_ = {}, offset_ = {};
   timesync_asked_ns_.reset(), signed_rightly_ = false;
   return port;
 }
@@ -176,8 +176,6 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
     timesync_asked_ns_.reset();
     const std::int64_t round_trip = now_ns - m.ts1;
     if (round_trip < 0) return;
-    trips_[1] = std::exchange(trips_[0], {});
-    trips_[0].take(round_trip, now);
     if (!offset_.at(now)) clock_ = {};  // the two clocks have drifted since
     clock_.add({m.tc1 - (m.ts1 + round_trip / 2), round_trip});
     offset_.take(*clock_.best(), now);
@@ -185,9 +183,7 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
 }
 
 std::optional<std::int64_t> AutopilotLink::round_trip(Time now) const noexcept {
-  const auto newest = trips_[0].at(now), before = trips_[1].at(now);
-  if (!newest || !before) return std::nullopt;
-  return std::min(newest->value, before->value);
+  return offset_.at(now) ? clock_.shortest(kTripsOfALine) : std::nullopt;
 }
 
 std::optional<LinkFault> AutopilotLink::fault(Time now) const noexcept {

@@ -25,6 +25,7 @@ using Port = std::variant<ClosedPort, SerialPort, UdpPort, TcpPort, PlainPort>;
 inline constexpr auto kFirstFrameTimeout = std::chrono::seconds(2);     ///< docs/faults.md row 19
 inline constexpr int kMaxMissedSetpoints = 2;                           ///< docs/faults.md row 20
 inline constexpr auto kTransmitStall = std::chrono::milliseconds(200);  ///< the same, where there are no set-points
+inline constexpr std::size_t kTripsOfALine = 4;                         ///< docs/faults.md row 58: 2 s of them
 inline constexpr std::uint8_t kOnboardComputer = 191;                   ///< our component id
 
 /// Commands that the link sends (MAV_CMD), to ask telemetry().result_of() for their answers.
@@ -75,8 +76,8 @@ class AutopilotLink {
   /// 5 ms, what telemetry() says has the time at which the controller took it, however old, otherwise that of its
   /// arrival.
   Latest<ClockOffset> clock(Time now) const noexcept { return offset_.at(now); }
-  /// ns, of a TIMESYNC question and its answer: the shorter of the last two, none older than kClockUseBy_ms; absent:
-  /// not two yet.
+  /// ns, of a TIMESYNC question and its answer: the shortest of the last kTripsOfALine, the newest within
+  /// kClockUseBy_ms; absent: not so many yet. What waits once for a processor or a radio is no slow line.
   std::optional<std::int64_t> round_trip(Time now) const noexcept;
   /// System id of the vehicle once its heartbeat was heard.
   std::optional<std::uint8_t> vehicle() const noexcept { return heard_; }
@@ -164,7 +165,6 @@ class AutopilotLink {
   static constexpr int kClockUseBy_ms = 10'000;  // all that the filter keeps; 0.5 ms at 50 ppm
   Fact<ClockOffset, kClockUseBy_ms> offset_;     // the filter's best
   std::optional<std::int64_t> timesync_asked_ns_;
-  std::array<Fact<std::int64_t, kClockUseBy_ms>, 2> trips_;  // ns, the newest first
   std::uint8_t sequence_ = 0;
   std::optional<mavlink::Signing> signing_;
   mavlink::SigningTime signing_start_ = 0;  // at signing_since_

@@ -12,6 +12,14 @@ std::optional<ClockOffset> ClockFilter::best() const noexcept {
   return *std::ranges::min_element(std::span(kept_).first(count_), {}, &ClockOffset::round_trip_ns);
 }
 
+std::optional<std::int64_t> ClockFilter::shortest(std::size_t exchanges) const noexcept {
+  if (exchanges == 0 || count_ < exchanges) return std::nullopt;
+  std::int64_t least = INT64_MAX;
+  for (std::size_t back = 1; back <= exchanges; ++back)
+    least = std::min(least, kept_[(next_ + kKept - back) % kKept].round_trip_ns);
+  return least;
+}
+
 void ClockFilter::add(const ClockOffset& exchange) noexcept {
   if (const auto believed = best()) {
     const std::int64_t errors = (believed->round_trip_ns + exchange.round_trip_ns) / 2;

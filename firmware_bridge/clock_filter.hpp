@@ -26,6 +26,8 @@ class ClockFilter {
   void add(const ClockOffset& exchange) noexcept;
   /// Absent before the first exchange.
   std::optional<ClockOffset> best() const noexcept;
+  /// The shortest round trip of the newest `exchanges` ≤ kKept, ns; absent: there were not so many.
+  std::optional<std::int64_t> shortest(std::size_t exchanges) const noexcept;
 
  private:
   std::array<ClockOffset, kKept> kept_{};

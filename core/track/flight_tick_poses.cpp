@@ -2,7 +2,6 @@
 // What a tick believes of poses: loop closures, odometry, and the controller's frame against the map's.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "core/track/flight_tick.hpp"
@@ -12,8 +11,7 @@ namespace backwash::track {
 namespace {
 
 constexpr double kClosureFades = 10;  // s: closures add up for so long, or an absurd one would come in pieces
-constexpr double kElsewhere = std::numeric_limits<double>::infinity();  // m: wherever it is
-constexpr int kLeavesGround = 65;  // ticks: PX4 says 1.15 s before it leaves the ground that it is in the air
+constexpr int kLeavesGround = 65;     // ticks: PX4 says 1.15 s before it leaves the ground that it is in the air
 
 std::int64_t nanoseconds(double s) noexcept { return static_cast<std::int64_t>(s * 1e9); }
 
@@ -153,13 +151,12 @@ double FlightTick::apart(const TickInput& in) const noexcept {
 bool FlightTick::frames_apart(const TickInput& in) const noexcept { return alignment_.position_residual() > apart(in); }
 
 // Odometry is a sensor of the autopilot's, not a command: it gets every good sample in every mode, so that its
-// estimator stays right under a pilot's hands and after us. What contradicts itself in flight is not forwarded until
-// the vehicle stands or follows us again; what is elsewhere than the autopilot, and turned as it is, is: that may be
-// its line's delay, and it lands by nothing better.
+// estimator stays right under a pilot's hands and after us. What we have stopped to believe in flight is not forwarded
+// until the vehicle stands or follows us again.
 void FlightTick::feed(const TickInput& in, TickOutput& out) noexcept {
   const bool again = !in.autopilot.armed || out.supervisor.mode == Mode::tracking;
-  const bool turned = was_commanding_ && !supervisor_.pose_trusted() && !alignment_.agree(kElsewhere);
-  feed_distrusted_ = odometry_distrusted_ || turned || (feed_distrusted_ && !again);
+  const bool distrusted = odometry_distrusted_ || (was_commanding_ && !supervisor_.pose_trusted());
+  feed_distrusted_ = distrusted || (feed_distrusted_ && !again);
   out.forward_odometry = out.fresh && !feed_distrusted_;
   out.odometry_resets = odometry_resets_;
 }

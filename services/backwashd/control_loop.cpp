@@ -119,7 +119,7 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
 }
 
 // The way back shows itself at once, in the stamps of poses: each of 0.3 s is older than both ways may take. A question
-// shows both, twice a second.
+// shows both, within 2 s.
 bool ControlLoop::line_slow(const track::AutopilotFacts& autopilot, std::int64_t now_ns) noexcept {
   constexpr int kSlowTicks = 15;
   const double age = autopilot.pose_age(now_ns);

@@ -30,6 +30,18 @@ TEST(ClockFilter, BelievesTheShortestRoundTrip) {
   EXPECT_EQ(filter.best()->round_trip_ns, 2 * kMillisecond);
 }
 
+// A line is as slow as its quickest exchange of late: what waits once says nothing, what came before says nothing.
+TEST(ClockFilter, TellsTheShortestOfTheNewestExchanges) {
+  ClockFilter filter;
+  for (int n = 0; n < 3; ++n) filter.add(exchange(kMillisecond, kMillisecond));
+  EXPECT_FALSE(filter.shortest(4)) << "there were three";
+  for (int n = 1; n <= 20; ++n) {
+    filter.add(exchange(kMillisecond, (n % 4 == 0 ? 9 : 50) * kMillisecond));
+    const std::int64_t least = n < 4 ? 2 : 10;
+    EXPECT_EQ(filter.shortest(4), least * kMillisecond) << n;
+  }
+}
+
 TEST(ClockFilter, IsFiveTimesCloserThanTheMeanOfWhatItWasGiven) {
   std::mt19937 random(7);
   std::exponential_distribution<double> waits(1 / 8e6);  // 8 ms in the mean, on the way back alone

@@ -98,7 +98,7 @@ TEST(SlowLine, OneThatBecomesSlowIsNamedAndNothingIsEnabledOnIt) {
       said = under_way.front();
       under_way.pop_front();
     };
-    rig.ticks(120);
+    rig.ticks(150);
     EXPECT_EQ(asks_to_enable(), Reason::line_slow);
     EXPECT_EQ(rig.mode(), Mode::passive);
     EXPECT_GT(*rig.view().round_trip, 0.1);
