@@ -52,7 +52,7 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   telemetry_ = Telemetry(known_);
   queue_.clear();
   budget_.forget();
-  clock_ = {}, offset_ = {};
+  clock_ = {}, offset_ = {}, loss_ = {};
   timesync_asked_ns_.reset(), signed_rightly_ = false;
   return port;
 }
@@ -126,6 +126,7 @@ void AutopilotLink::take_frame(const mavlink::Frame& frame, Time now) noexcept {
   if (frame.sender.component != kFlightController) return;
   const auto expected = heard_ ? heard_ : configured_vehicle_;
   if (expected && frame.sender.system != *expected) return;
+  loss_.heard(frame.sender.sequence, received().unknown_id);
   if (frame.id == mavlink::Heartbeat::kId) {
     const auto m = mavlink::decode<mavlink::Heartbeat>(frame.payload);
     if (m.autopilot == kAutopilotInvalid) return;
@@ -174,6 +175,7 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
     constexpr std::int64_t kSane_ns = std::int64_t{1} << 62;  // 146 years: differences do not overflow
     if (m.tc1 < 0 || m.tc1 > kSane_ns) return;
     timesync_asked_ns_.reset();
+    loss_.answered();
     const std::int64_t round_trip = now_ns - m.ts1;
     if (round_trip < 0) return;
     if (!offset_.at(now)) clock_ = {};  // the two clocks have drifted since
@@ -260,6 +262,7 @@ bool AutopilotLink::send_parameter_request(std::size_t rule) noexcept {
 
 bool AutopilotLink::send_timesync(Time now) noexcept {
   timesync_asked_ns_ = nanoseconds_of(now);
+  loss_.asked();
   return send(mavlink::Timesync{0, *timesync_asked_ns_, heard_.value_or(0), kFlightController});
 }
 

@@ -9,6 +9,7 @@
 
 #include "firmware_bridge/clock_filter.hpp"
 #include "firmware_bridge/line_budget.hpp"
+#include "firmware_bridge/line_loss.hpp"
 #include "firmware_bridge/mavlink/signing.hpp"
 #include "firmware_bridge/outgoing.hpp"
 #include "firmware_bridge/plain_port.hpp"
@@ -79,6 +80,8 @@ class AutopilotLink {
   /// ns, of a TIMESYNC question and its answer: the shortest of the last kTripsOfALine, the newest within
   /// kClockUseBy_ms; absent: not so many yet. What waits once for a processor or a radio is no slow line.
   std::optional<std::int64_t> round_trip(Time now) const noexcept;
+  /// Of the newest LineLoss::kQuestions; absent: not so many yet, or none is answered.
+  std::optional<LineLoss::Shares> loss() const noexcept { return loss_.shares(std::holds_alternative<UdpPort>(port_)); }
   /// System id of the vehicle once its heartbeat was heard.
   std::optional<std::uint8_t> vehicle() const noexcept { return heard_; }
   /// Time since the vehicle's last heartbeat; absent: there was none.
@@ -162,6 +165,7 @@ class AutopilotLink {
   std::optional<Time> blocked_;  // since when the port has taken nothing of what waits
   std::optional<std::uint8_t> heard_;
   ClockFilter clock_;
+  LineLoss loss_;
   static constexpr int kClockUseBy_ms = 10'000;  // all that the filter keeps; 0.5 ms at 50 ppm
   Fact<ClockOffset, kClockUseBy_ms> offset_;     // the filter's best
   std::optional<std::int64_t> timesync_asked_ns_;

@@ -78,12 +78,12 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.odometry_age = flight_.odometry_age();
   view_.odometry_lost_after = flight_.odometry_lost_after();
   view_.heartbeat_age = in.autopilot.heartbeat_age;
-  const auto clock = link_.clock(now);
-  view_.clock = clock ? std::optional(clock->value) : std::nullopt;
+  const auto value_of = [](const auto& said) { return said ? std::optional(said->value) : std::nullopt; };
+  view_.clock = value_of(link_.clock(now));
   view_.untold_delay = link_.untold_delay();
   const auto trip = link_.round_trip(now);
   view_.round_trip = trip ? std::optional(seconds(*trip)) : std::nullopt;
-  const auto value_of = [](const auto& said) { return said ? std::optional(said->value) : std::nullopt; };
+  view_.loss = link_.loss();
   view_.estimator_follows = value_of(telemetry.estimator_follows.at(now));
   view_.would_arm = value_of(telemetry.would_arm.at(now));
   view_.pose_age = in.autopilot.pose_age(in.now_ns);

@@ -7,7 +7,7 @@
 
 #include "core/plan/planner.hpp"
 #include "core/types/formatted.hpp"
-#include "firmware_bridge/line_budget.hpp"
+#include "services/backwashd/doubts.hpp"
 #include "services/backwashd/switch_reaction.hpp"
 #include "services/dds/topics.hpp"
 
@@ -191,12 +191,8 @@ Decision Mission::enable() {
   if (view_.heartbeat_age > track::Supervisor::kHeartbeatLost) return refused("no heartbeat from the autopilot");
   if (view_.pose_age > track::Supervisor::kPoseSilent)
     return refused("no pose from the autopilot: its estimator does not follow the VIO yet, or its stream is off");
-  if (view_.estimator_follows == false)
-    return refused(
-        "the autopilot's estimator says that it takes its position from no sensor: it does not follow the VIO");
-  if (const double allowed = firmware_bridge::line_allowed(vehicle_, view_.untold_delay); view_.round_trip > allowed)
-    return refused(formatted("the line takes %.3f s there and back, and the vehicle file's latencies allow for %.3f s",
-                             *view_.round_trip, allowed));
+  for (const auto& [what, doubt] : doubts_of(view_, vehicle_))
+    if (std::string_view(what) != dds::kArming) return refused(std::string(what) + ": " + doubt);
   if (!world_->grid.inside(world_->grid.index(view_.state.p_W))) return refused("the vehicle is outside the map");
   const std::string forbids =
       firmware_bridge::forbidding_parameter(*view_.autopilot, view_.parameters, vehicle_, view_.untold_delay);

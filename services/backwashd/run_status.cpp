@@ -7,8 +7,8 @@
 #include <thread>
 #include <vector>
 
-#include "firmware_bridge/line_budget.hpp"
 #include "services/backwashd/dds_front.hpp"
+#include "services/backwashd/doubts.hpp"
 #include "services/backwashd/shown_diagnostics.hpp"
 #include "services/backwashd/shown_segment.hpp"
 #include "services/backwashd/text.hpp"
@@ -42,29 +42,11 @@ std::string to_string(const AirView& air) {
   return to_text(said);
 }
 
-/// What speaks against a flight beside parameters and poses.
-std::vector<std::pair<const char*, std::string>> doubts_of(const ControlView& view, const Vehicle& vehicle) {
-  std::vector<std::pair<const char*, std::string>> doubts;
-  const double allowed = firmware_bridge::line_allowed(vehicle, view.untold_delay);
-  if (view.round_trip > allowed)
-    doubts.emplace_back("line",
-                        fmt::format("{:.3f} s there and back, the sets allow for {:.3f} s: a faster line, or larger "
-                                    "controller.latency and feedback_delay in the vehicle file",
-                                    *view.round_trip, allowed));
-  if (view.estimator_follows == false)
-    doubts.emplace_back("estimator", "it takes its position from no sensor: it does not follow the VIO");
-  if (view.offboard && !view.armed && view.would_arm == false)  // by its checks for this mode
-    doubts.emplace_back(dds::kArming,
-                        "the autopilot would refuse it" +
-                            (view.warning ? ": " + printable(view.warning->value.text.data()) : std::string()));
-  return doubts;
-}
-
 /// Owns what a message only points to, until it is sent.
 struct StatusStrings {
   std::string state, reason, mismatch, stop_switch, autopilot, version, warning, air;
   std::string asking;
-  std::vector<std::pair<const char*, std::string>> doubts;
+  Doubts doubts;
   std::vector<firmware_bridge::ParameterFinding> findings;
   std::vector<dds::Parameter> parameters;
   std::vector<dds::Advice> advice;

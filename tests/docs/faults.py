@@ -11,7 +11,7 @@ import re
 import subprocess
 import sys
 
-ROWS = 59
+ROWS = 60
 
 
 def known_tests(build: str) -> list[str]:

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""skipped.py BUILD [LIST]: names each test that ctest's last run in BUILD skipped, and why.
+"""skipped.py BUILD [LIST [--but-stalled]]: names each test that ctest's last run in BUILD skipped, and why.
 
 Exit 1 where one gives no reason that a machine can have (tests/support/skip.sh); with LIST, also where one is not in it. A line
-of LIST is a test's name, a space and the reason; it has five lines at most.
+of LIST is a test's name, a space and the reason; it has five lines at most. --but-stalled: those that only a machine that stood
+still skipped need not be in LIST; they alone are printed, as an expression for ctest -R, to be tried again.
 """
 import pathlib
 import re
@@ -36,14 +37,17 @@ def main() -> int:
             print(f"{sys.argv[2]}: {len(allowed)} tests may be skipped, five at most")
             return 1
     wrong = 0
+    again = sorted(name for name, reason in told.items() if len(sys.argv) > 3 and (reason or "").startswith("stalled: "))
+    if len(sys.argv) > 3:
+        print("|".join(f"^{re.escape(name)}$" for name in again))
     for name, reason in sorted(told.items()):
         complaint = ""
         if reason is None:
             complaint = " <- FAILED: a test is skipped for what this machine cannot do, and says so"
-        elif allowed is not None and name not in allowed:
+        elif allowed is not None and name not in allowed and name not in again:
             complaint = f" <- FAILED: not in {sys.argv[2]}"
         wrong += bool(complaint)
-        print(f"skipped: {name}: {reason or 'no reason'}{complaint}")
+        print(f"skipped: {name}: {reason or 'no reason'}{complaint}", file=sys.stderr if len(sys.argv) > 3 else sys.stdout)
     return 1 if wrong else 0
 
 
