@@ -9,8 +9,8 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 kind=$1 path=$2 build=$3 out=$4
 shift 4
-all=(hold stop land vio_stop vio_freeze vio_jump vio_turn sigstop kill frozen line_off power_off restart pilot battery rc gcs link reboot
-  stop_arming stop_takeoff stop_plan stop_replan stop_land stop_goto
+all=(hold stop land vio_stop vio_freeze vio_jump vio_turn sigstop kill frozen line_off power_off restart pilot battery rc gcs link late streams
+  reboot   stop_arming stop_takeoff stop_plan stop_replan stop_land stop_goto
   hold_stop_0.2 hold_stop_0.45 hold_stop_1.0 stop_hold hold_hold door_hold_stop door_hold_goto gap_hold_stop gap_hold_goto vio_gap_stop)
 [[ $# -gt 0 ]] || set -- "${all[@]}"
 if [[ ! -e $path ]]; then
@@ -44,7 +44,7 @@ case $kind/$fault in
   px4/gcs) SETTINGS=${SETTINGS:-NAV_DLL_ACT=3 COM_DL_LOSS_T=5} ;;
 esac
 case $kind/$fault in
-  */link | */line_off) RELAY=yes ;;
+  */link | */line_off | */late | */streams) RELAY=yes ;;
   ardupilot/battery | ardupilot/gcs) STATION="tcp 5763" ;;
   px4/gcs) STATION="udp 18570" ;;
   px4/rc | px4/pilot) STATION="udp 18570 sticks" ;;
@@ -165,6 +165,8 @@ inject() {
         echo 1900 >"$work/switch"
       fi
       ;;
+    late) echo late 0.1 >&8 ;;  # each way
+    streams) echo streams >&8 ;;  # a station's on the same line, see relay.py
     link) echo cut >&8 && sleep 3 && echo go >&8 ;;
     rc) if [[ $kind == px4 ]]; then echo sticks >&8; else echo 900 >"$work/throttle"; fi ;;
     *) die "no fault $fault: ${all[*]}" ;;

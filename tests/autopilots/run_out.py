@@ -35,7 +35,7 @@ SAYS = {"hold": "", "stop": STOPS, "land": "land: operator asks to land", "vio_s
         "sigstop": "quiet: no heartbeat|hold: autopilot's pose|quiet: port|hold: map and autopilot|hold: odometry lost", "kill": "passive: started", "frozen": "passive: started", "line_off": "quiet: no heartbeat", "power_off": "",
         "restart": "land: operator asks to land", "pilot": "passive: autopilot left offboard",
         "battery": "land: battery low|passive: autopilot left offboard", "rc": "passive: autopilot left offboard",
-        "gcs": "passive: autopilot left offboard", "link": "quiet: no heartbeat", "reboot": "tracking: lifted off", "stop_arming": "land: operator asks to stop|passive: ",
+        "gcs": "passive: autopilot left offboard", "link": "quiet: no heartbeat", "late": "hold: line to the autopilot slow", "streams": "", "reboot": "tracking: lifted off", "stop_arming": "land: operator asks to stop|passive: ",
         "stop_takeoff": "land: operator asks to stop|hold: operator asks to stop", "stop_plan": STOPS, "stop_replan": STOPS,
         "stop_land": "land: operator asks to land", "stop_goto": STOPS}
 # Faults of several commands: each of its set-points and sets is judged.
