@@ -194,8 +194,10 @@ void Telemetry::take(const mavlink::AutopilotVersion& m, Time) noexcept {
 }
 
 void Telemetry::take_estimator(std::uint16_t flags, Time now) noexcept {
-  constexpr unsigned kPosition = 8 + 16, kConstantPosition = 128;  // ESTIMATOR_STATUS_FLAGS, EKF_STATUS_FLAGS
-  estimator_follows.take((flags & kPosition) != 0 && (flags & kConstantPosition) == 0, now);
+  // ESTIMATOR_STATUS_FLAGS, EKF_STATUS_FLAGS. PX4 says from 1.16 on by PRED_POS_HORIZ_REL that a sensor aids it, and
+  // CONST_POS_MODE (128) also of a vehicle at rest (get_ekf_soln_status); elsewhere it is as POS_HORIZ_REL.
+  constexpr unsigned kPosition = 8 + 16, kAided = 256;
+  estimator_follows.take((flags & kPosition) != 0 && (flags & kAided) != 0, now);
 }
 
 void Telemetry::restarted() noexcept {

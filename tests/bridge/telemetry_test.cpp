@@ -149,6 +149,26 @@ TEST(Telemetry, TheErrorOfThePositionIsThatOfItsWorstAxis) {
   }
 }
 
+// Flags of real firmwares at rest on the ground, before their odometry came and with it.
+TEST(Telemetry, AnEstimatorFollowsWhereASensorAidsItAlsoAtRest) {
+  Telemetry t;
+  const auto px4 = [&](std::uint16_t flags) {
+    t.take(mavlink::EstimatorStatus{.flags = flags}, kMoment);
+    return t.estimator_follows.at(kMoment)->value;
+  };
+  EXPECT_FALSE(px4(193)) << "1.15.4";
+  EXPECT_TRUE(px4(895)) << "1.15.4";
+  EXPECT_FALSE(px4(1253)) << "1.16.1";
+  EXPECT_FALSE(px4(229)) << "1.17.0-beta1";
+  EXPECT_TRUE(px4(1023)) << "1.16.1 and 1.17.0-beta1";
+  const auto arducopter = [&](std::uint16_t flags) {
+    t.take(mavlink::EkfStatusReport{.flags = flags}, kMoment);
+    return t.estimator_follows.at(kMoment)->value;
+  };
+  EXPECT_FALSE(arducopter(1024)) << "4.6.3 and 4.7";
+  EXPECT_TRUE(arducopter(831)) << "4.6.3 and 4.7";
+}
+
 TEST(Telemetry, DropsSwappedPacketsButFollowsARestartedClock) {
   Telemetry t;
   const auto position_at = [](std::uint32_t ms, float x) {
