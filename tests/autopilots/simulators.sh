@@ -79,7 +79,10 @@ begin_px4() {
   exec 6<>"$work/silence"  # its shell spins on a standard input that has ended
   (
     cd "$work/px4"
-    (grep -v '^#' "$here/px4.params"; printf '%s\n' "$@") | sed -n 's/^\(.*\)=/param set \1 /p' >px4-rc.params  # its startup reads it
+    while read -r setting; do
+      export "PX4_PARAM_${setting?}"                                  # 1.16 and later read these,
+      echo "param set ${setting%%=*} ${setting#*=}" >>px4-rc.params  # 1.15 this
+    done < <(grep -v '^#' "$here/px4.params"; printf '%s\n' "$@" | grep .)
     export PATH=$work/px4:$build/bin:$PATH PX4_SIM_MODEL=${model_of_px4:-sihsim_quadx}
     [[ $PX4_SIM_MODEL != sihsim* ]] || export PX4_SIMULATOR=sihsim
     fifo "$build/bin/px4" -d "$build/etc"
