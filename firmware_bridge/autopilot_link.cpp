@@ -53,7 +53,7 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   queue_.clear();
   budget_.forget();
   clock_ = {}, offset_ = {}, loss_ = {};
-  timesync_asked_ns_.reset(), signed_rightly_ = false;
+  asked_ns_ = {}, signed_rightly_ = false;
   return port;
 }
 
@@ -171,10 +171,10 @@ void AutopilotLink::take_timesync(const mavlink::Timesync& m, Time now) noexcept
   const std::int64_t now_ns = nanoseconds_of(now);
   if (m.tc1 == 0) {
     send(mavlink::Timesync{now_ns, m.ts1, *heard_, kFlightController});
-  } else if (timesync_asked_ns_ == m.ts1) {
+  } else if (const auto asked = std::ranges::find(asked_ns_, m.ts1); m.ts1 != 0 && asked != asked_ns_.end()) {
     constexpr std::int64_t kSane_ns = std::int64_t{1} << 62;  // 146 years: differences do not overflow
     if (m.tc1 < 0 || m.tc1 > kSane_ns) return;
-    timesync_asked_ns_.reset();
+    *asked = 0;
     loss_.answered();
     const std::int64_t round_trip = now_ns - m.ts1;
     if (round_trip < 0) return;
@@ -261,9 +261,11 @@ bool AutopilotLink::send_parameter_request(std::size_t rule) noexcept {
 }
 
 bool AutopilotLink::send_timesync(Time now) noexcept {
-  timesync_asked_ns_ = nanoseconds_of(now);
-  loss_.asked();
-  return send(mavlink::Timesync{0, *timesync_asked_ns_, heard_.value_or(0), kFlightController});
+  const std::int64_t now_ns = nanoseconds_of(now);
+  if (!send(mavlink::Timesync{0, now_ns, heard_.value_or(0), kFlightController})) return false;
+  asked_ns_[questions_++ % asked_ns_.size()] = now_ns;
+  if (const auto age = heartbeat_age(now); age && *age < kHeartbeatTimeout) loss_.asked();
+  return true;
 }
 
 bool AutopilotLink::send_command(std::uint16_t command, const std::array<float, 7>& p) noexcept {

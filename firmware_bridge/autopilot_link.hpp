@@ -81,7 +81,9 @@ class AutopilotLink {
   /// kClockUseBy_ms; absent: not so many yet. What waits once for a processor or a radio is no slow line.
   std::optional<std::int64_t> round_trip(Time now) const noexcept;
   /// Of the newest LineLoss::kQuestions; absent: not so many yet, or none is answered.
-  std::optional<LineLoss::Shares> loss() const noexcept { return loss_.shares(std::holds_alternative<UdpPort>(port_)); }
+  std::optional<LineLoss::Shares> loss() const noexcept {
+    return loss_.shares(std::holds_alternative<UdpPort>(port_), signing_.has_value());
+  }
   /// System id of the vehicle once its heartbeat was heard.
   std::optional<std::uint8_t> vehicle() const noexcept { return heard_; }
   /// Time since the vehicle's last heartbeat; absent: there was none.
@@ -168,7 +170,8 @@ class AutopilotLink {
   LineLoss loss_;
   static constexpr int kClockUseBy_ms = 10'000;  // all that the filter keeps; 0.5 ms at 50 ppm
   Fact<ClockOffset, kClockUseBy_ms> offset_;     // the filter's best
-  std::optional<std::int64_t> timesync_asked_ns_;
+  std::array<std::int64_t, 8> asked_ns_{};       // TIMESYNC questions that have no answer yet, else 0: 4 s of them
+  std::size_t questions_ = 0;
   std::uint8_t sequence_ = 0;
   std::optional<mavlink::Signing> signing_;
   mavlink::SigningTime signing_start_ = 0;  // at signing_since_

@@ -8,19 +8,13 @@
 #include "firmware_bridge/mavlink/messages.hpp"
 
 namespace backwash::firmware_bridge {
-namespace {
-
-constexpr double kFrame = mavlink::kHeaderV2 + mavlink::kChecksum;
-constexpr double kLonger = (kFrame + mavlink::info<mavlink::Odometry>().full_length) /
-                           (kFrame + mavlink::info<mavlink::Timesync>().full_length);
-
-}  // namespace
 
 void LineLoss::heard(std::uint8_t sequence, std::uint64_t passed_over) noexcept {
   const int gap = last_ ? static_cast<std::uint8_t>(sequence - *last_ - 1) : 0;
   if (gap == 255) return;  // twice
   ++newest().frames;
-  if (gap > 127) {  // the count is of 8 bits: one that was overtaken, or too long a silence to tell
+  constexpr int kOvertaken = 240;  // and more: the count is of 8 bits
+  if (gap >= kOvertaken) {
     newest().missing -= newest().missing > 0;
     return;
   }
@@ -36,7 +30,7 @@ void LineLoss::asked() noexcept {
 
 void LineLoss::answered() noexcept { newest().answered = true; }
 
-std::optional<LineLoss::Shares> LineLoss::shares(bool datagrams) const noexcept {
+std::optional<LineLoss::Shares> LineLoss::shares(bool datagrams, bool authenticated) const noexcept {
   if (asked_ <= kQuestions) return std::nullopt;
   double frames = 0, missing = 0, answered = 0;
   for (std::size_t back = 1; back <= kQuestions; ++back) {
@@ -46,7 +40,11 @@ std::optional<LineLoss::Shares> LineLoss::shares(bool datagrams) const noexcept 
   if (answered == 0 || frames == 0) return std::nullopt;
   const double in = missing / (frames + missing);
   const double arrives = std::min(1.0, answered / kQuestions / (1 - in));
-  return Shares{in, 1 - arrives, 1 - std::pow(arrives, datagrams ? 1 : kLonger)};
+  const double perhaps = std::min(1.0, arrives + 2 * std::sqrt(arrives * (1 - arrives) / kQuestions));
+  const double frame = mavlink::kHeaderV2 + mavlink::kChecksum + (authenticated ? mavlink::kSignature : 0);
+  const double longer = (frame + mavlink::info<mavlink::Odometry>().full_length) /
+                        (frame + mavlink::info<mavlink::Timesync>().full_length);
+  return Shares{in, 1 - arrives, 1 - std::pow(perhaps, datagrams ? 1 : longer)};
 }
 
 }  // namespace backwash::firmware_bridge

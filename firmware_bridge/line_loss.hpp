@@ -17,7 +17,7 @@ class LineLoss {
   struct Shares {
     double in;        ///< of the autopilot's frames that do not arrive here
     double out;       ///< of our short frames (TIMESYNC) that do not arrive there
-    double odometry;  ///< of ODOMETRY
+    double odometry;  ///< of ODOMETRY, at least: two standard errors of so many questions below what they say
   };
 
   /// A frame of the autopilot's arrived; `sequence`: its number, `passed_over`: frames of messages that we do not know
@@ -26,8 +26,8 @@ class LineLoss {
   void asked() noexcept;
   void answered() noexcept;
   /// Absent: not kQuestions yet, or one that answers none. `datagrams`: a frame is lost whole, whatever its length;
-  /// otherwise byte by byte.
-  std::optional<Shares> shares(bool datagrams) const noexcept;
+  /// otherwise byte by byte. `authenticated`: frames bear signatures.
+  std::optional<Shares> shares(bool datagrams, bool authenticated) const noexcept;
 
  private:
   struct Question {

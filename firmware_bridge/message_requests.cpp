@@ -19,6 +19,7 @@ std::optional<Stream> MessageRequests::next(const AutopilotProfile& autopilot, c
     asked_.reset();
     ++at_;
   }
+  if (asked_late_ && now - *asked_late_ < kApart / 2) return std::nullopt;
   const auto open = [&] {
     while (at_ < wishes && denied_.test(at_)) ++at_;
     return at_ < wishes;
@@ -42,10 +43,16 @@ std::optional<Stream> MessageRequests::late(const Telemetry& telemetry, Time now
     const auto age = fact.age(now);
     return age && *age > kLate;
   };
-  const bool position = is_late(telemetry.local_state);
-  if ((!position && !is_late(telemetry.attitude)) || (late_ && now - *late_ < kApart)) return std::nullopt;
-  late_ = now;
-  return position ? kPositionStream : kAttitudeStream;
+  if (asked_) return std::nullopt;  // one question at a time: an answer does not say to which
+  const auto may = [&](std::optional<Time>& last) {
+    if (last && now - *last < kApart) return false;
+    last = asked_late_ = now;
+    return true;
+  };
+  if (asked_late_ && now - *asked_late_ < kApart / 4) return std::nullopt;
+  if (is_late(telemetry.local_state) && may(late_position_)) return kPositionStream;
+  if (is_late(telemetry.attitude) && may(late_attitude_)) return kAttitudeStream;
+  return std::nullopt;
 }
 
 }  // namespace backwash::firmware_bridge

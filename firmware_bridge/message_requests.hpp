@@ -22,7 +22,8 @@ class MessageRequests {
 
   /// What is to be asked for now, if anything. `answer`: the newest to SET_MESSAGE_INTERVAL.
   std::optional<Stream> next(const AutopilotProfile& autopilot, const Latest<CommandResult>& answer, Time now) noexcept;
-  /// The stream whose newest message is older than kLate, if it may be asked for now: at once, then every kApart.
+  /// The stream whose newest message is older than kLate, if it may be asked for now: at once, then every kApart
+  /// each, a quarter of that apart from the other's.
   std::optional<Stream> late(const Telemetry& telemetry, Time now) noexcept;
   /// Another autopilot may be there now, or the same one anew: everything is asked for again.
   void forget() noexcept { *this = {}; }
@@ -32,7 +33,7 @@ class MessageRequests {
   std::size_t at_ = 0;                 // the stream that was asked for last, or is next; the estimator's behind all
   std::optional<Time> asked_, round_;  // waiting for its answer; begin of this round
   std::optional<Time> last_;           // question of a later round
-  std::optional<Time> late_;           // question before its turn
+  std::optional<Time> late_position_, late_attitude_, asked_late_;  // questions before their turn
 };
 
 }  // namespace backwash::firmware_bridge

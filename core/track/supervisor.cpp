@@ -57,7 +57,7 @@ void Supervisor::note_link_and_operator(const SupervisorInput& in, Occurring& no
   now[Reason::clock_stopped] = in.missed_periods >= kMissedQuiet;                                          // row 32
   now[Reason::deadline_missed] = in.missed_periods > 0 && missed_.front() >= period_ - 1 - kMissedWithin;  // row 32
   now[Reason::operator_request] = (in.request == Request::disable || in.request == Request::stop) &&
-                                  (mode_ == Mode::enabling || !(in.armed || in.arming));
+                                  ((mode_ == Mode::enabling && !(in.armed && in.offboard)) || !(in.armed || in.arming));
   // A disable that comes when the vehicle may have left the ground.
   now[Reason::stop_requested] = in.request == Request::stop || in.request == Request::disable;
   now[Reason::land_requested] = in.request == Request::land;
@@ -127,8 +127,9 @@ SupervisorOutput Supervisor::step(const SupervisorInput& in) noexcept {
   } else {
     for (const Transition& t : transitions()) {
       if (!contains(t.from, mode_) || !occurs[t.when]) continue;
-      // A hold on a pose that is not trusted keeps its first cause; a trusted one does not begin anew.
-      if (t.to == mode_ && (!pose_trusted() || t.when == reason_)) continue;
+      // A hold on a pose that is not trusted keeps its first cause; a trusted one does not begin anew, and a line that
+      // stays slow takes no other's place.
+      if (t.to == mode_ && (!pose_trusted() || t.when == reason_ || t.when == Reason::line_slow)) continue;
       enter(t.to, t.when);
       break;
     }

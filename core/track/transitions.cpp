@@ -16,6 +16,9 @@ constexpr Transition kTransitions[] = {
     {kCommanding, Reason::autopilot_silent, Mode::quiet},
     {kCommanding, Reason::clock_stopped, Mode::quiet},
     {kEnabling, Reason::operator_request, Mode::passive},
+    // It is in the air in our mode, as after a restart, and nobody else has it in hand.
+    {kEnabling, Reason::land_requested, Mode::land},
+    {kEnabling, Reason::stop_requested, Mode::land},
     {kEnabling, Reason::offboard_left, Mode::passive},
     {kEnabling, Reason::odometry_lost, Mode::passive},
     {kEnabling, Reason::odometry_jump, Mode::passive},

@@ -19,11 +19,12 @@ Doubts doubts_of(const ControlView& view, const Vehicle& vehicle) {
                                     "controller.latency and feedback_delay in the vehicle file",
                                     *view.round_trip, allowed));
   if (view.loss && view.loss->odometry > kMostOdometryLost)
-    doubts.emplace_back("line", fmt::format("it loses {:.1f} % of the autopilot's frames, {:.1f} % of our short ones "
-                                            "and so {:.0f} % of ODOMETRY, of which {:.0f} % may be lost: a better "
-                                            "cable or radio, or another baud rate",
-                                            100 * view.loss->in, 100 * view.loss->out, 100 * view.loss->odometry,
-                                            100 * kMostOdometryLost));
+    doubts.emplace_back(
+        "line",
+        fmt::format("it loses {:.1f} % of the autopilot's frames, {:.1f} % of our short ones "
+                    "and so {:.0f} % of ODOMETRY at least, of which {:.0f} % may be lost: a better "
+                    "cable or radio, or another baud rate",
+                    100 * view.loss->in, 100 * view.loss->out, 100 * view.loss->odometry, 100 * kMostOdometryLost));
   if (view.estimator_follows == false)
     doubts.emplace_back("estimator", "it takes its position from no sensor: it does not follow the VIO");
   if (view.offboard && !view.armed && view.would_arm == false)  // by its checks for this mode

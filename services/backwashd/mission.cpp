@@ -238,8 +238,9 @@ bool Mission::abandoned() const {
 
 /// Also where it was asked for before: the line may have lost that.
 Decision Mission::land() {
-  const bool ours = flies(view_.mode) || view_.mode == Mode::lifting || view_.mode == Mode::land || abandoned();
-  return ours ? order(Request::land, "landing") : refused("not enabled");
+  const bool followed = view_.mode == Mode::enabling && view_.armed && view_.offboard;
+  const bool ours = flies(view_.mode) || view_.mode == Mode::lifting || view_.mode == Mode::land;
+  return ours || followed || abandoned() ? order(Request::land, "landing") : refused("not enabled");
 }
 
 /// What was planned ends at once; a plan that slows the flight down on its path follows.

@@ -105,14 +105,13 @@ TEST_F(MessageRequestsTest, APoseThatIsLateIsAskedForBeforeItsTurn) {
     EXPECT_FALSE(requests_.late(t, now_));
   }
   const auto begin = now_;
-  std::vector<int> asked_ms;
+  std::map<std::uint32_t, std::vector<int>> asked_ms;
   for (; now_ < begin + 600ms; now_ += 20ms)
-    if (const auto stream = requests_.late(t, now_)) {
-      EXPECT_EQ(stream->id, kPositionStream.id);
-      asked_ms.push_back(static_cast<int>((now_ - begin) / 1ms));
-    }
-  EXPECT_EQ(asked_ms, (std::vector<int>{120, 320, 520}));
-  now_ += 150ms;
+    if (const auto stream = requests_.late(t, now_))
+      asked_ms[stream->id].push_back(static_cast<int>((now_ - begin) / 1ms));
+  EXPECT_EQ(asked_ms[kPositionStream.id], (std::vector<int>{120, 320, 520}));
+  EXPECT_EQ(asked_ms[kAttitudeStream.id], (std::vector<int>{180, 380, 580})) << "both before HOLD at 300 ms";
+  now_ += 200ms;
   t.take(mavlink::LocalPositionNed{.time_boot_ms = 5000}, now_);
   const auto other = requests_.late(t, now_);
   ASSERT_TRUE(other) << "the position is back";

@@ -213,6 +213,12 @@ TEST(SupervisorFacts, WhatComesUpWhileEnablingEndsIt) {
     EXPECT_EQ(out.mode, Mode::passive) << to_string(row.reason);
     EXPECT_EQ(out.reason, row.reason) << to_string(row.reason);
   }
+  SupervisorInput flies = healthy();  // after a restart in the air, before the frames agree
+  flies.frames_aligned = false;
+  for (const Request asked : {Request::land, Request::stop, Request::disable}) {
+    flies.request = asked;
+    EXPECT_EQ(enabling().step(flies).mode, Mode::land);
+  }
 }
 
 TEST(SupervisorFacts, FramesThatAreNotAlignedSendNothingAndAreNotFollowed) {

@@ -228,6 +228,17 @@ std::string table() {
   return text;
 }
 
+TEST(Supervisor, ASlowLineTakesNoOtherReasonsPlaceInAHold) {
+  Supervisor s = flying();
+  int changes = 0;
+  for (int tick = 0; tick < 50; ++tick) {
+    SupervisorInput in = healthy();
+    in.line_slow = in.frames_apart = true;
+    changes += s.step(in).changed;
+  }
+  EXPECT_LE(changes, 2) << "each is told, logged, and ends what is planned";
+}
+
 TEST(Supervisor, IsDocumentedAsItIs) {
   std::ifstream in(BACKWASH_SOURCE_DIR "/core/track/README.md");
   const std::string readme{std::istreambuf_iterator<char>(in), {}};
