@@ -160,11 +160,11 @@ TEST(StandardOutputFault, PipesTerminalsAndLimitsKillAndStopNoProcessAndHangUpsA
     Failure failure(stop);
     for (const int harmless : {SIGPIPE, SIGXFSZ, SIGTTOU, SIGTTIN, SIGTSTP, SIGUSR1, SIGUSR2, SIGHUP})
       ::kill(::getpid(), harmless);
+    const auto begun = std::chrono::steady_clock::now();
     std::thread later([] {
       std::this_thread::sleep_for(100ms);
       ::kill(::getpid(), SIGTERM);
     });
-    const auto begun = std::chrono::steady_clock::now();
     wait_for_end(signals, failure);
     later.join();
     return std::chrono::steady_clock::now() - begun >= 90ms ? 5 : 1;
