@@ -23,7 +23,9 @@ class LineLoss {
   /// A frame of the autopilot's arrived; `sequence`: its number, `passed_over`: frames of messages that we do not know
   /// so far (ParserCounters::unknown_id), which arrived too.
   void heard(std::uint8_t sequence, std::uint64_t passed_over) noexcept;
+  /// A TIMESYNC question was sent: one more is looked at.
   void asked() noexcept;
+  /// A question was answered; late ones count for the newest.
   void answered() noexcept;
   /// Absent: not kQuestions yet, or one that answers none. `datagrams`: a frame is lost whole, whatever its length;
   /// otherwise byte by byte. `authenticated`: frames bear signatures.

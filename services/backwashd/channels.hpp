@@ -140,7 +140,7 @@ struct ControlView {
   std::optional<bool> estimator_follows, would_arm;         ///< as the autopilot says of itself, while it says it
   double untold_delay = 0;                                  ///< of the autopilot's line, s
   std::optional<double> round_trip;  ///< of a question on that line, the shortest of the last four, s
-  std::optional<firmware_bridge::LineLoss::Shares> loss;  ///< of its frames, of ours, of ODOMETRY
+  std::optional<firmware_bridge::LineLoss::Shares> loss;  ///< shares lost of its frames, of ours, of ODOMETRY
   /// Its newest line of a warning or graver, and when it came: why it does not do what it is asked.
   firmware_bridge::Latest<firmware_bridge::StatusLine> warning;
   firmware_bridge::Latest<firmware_bridge::Battery> battery;  ///< the autopilot's, while it says it

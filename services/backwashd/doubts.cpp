@@ -10,7 +10,7 @@
 namespace backwash::daemon {
 
 Doubts doubts_of(const ControlView& view, const Vehicle& vehicle) {
-  constexpr double kMostOdometryLost = 0.5;  // at 30 Hz, 0.3 s without one is then once in 17 s
+  constexpr double kMostOdometryLost = 0.5;  // chosen: a VIO of 30 Hz comes as one of 15 Hz
   Doubts doubts;
   const double allowed = firmware_bridge::line_allowed(vehicle, view.untold_delay);
   if (view.round_trip > allowed)

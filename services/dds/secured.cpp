@@ -33,11 +33,11 @@ dds_qos* secured(const std::string& credentials) {
   const std::pair<std::string, std::string> libraries[] = {
       {"auth", "authentication"}, {"access", "access_control"}, {"crypto", "crypto"}};
   for (const auto& [kind, calls] : libraries) {
-    const std::string property = "dds.sec." + kind + ".library";
+    const std::string property = "dds.sec." + kind + '.';
     const std::string file = "libdds_security_" + (kind == "access" ? "ac" : kind) + ".so";
-    dds_qset_prop(qos, (property + ".path").c_str(), (folder + file).c_str());
-    dds_qset_prop(qos, (property + ".init").c_str(), ("init_" + calls).c_str());
-    dds_qset_prop(qos, (property + ".finalize").c_str(), ("finalize_" + calls).c_str());
+    dds_qset_prop(qos, (property + "library.path").c_str(), (folder + file).c_str());
+    dds_qset_prop(qos, (property + "library.init").c_str(), ("init_" + calls).c_str());
+    dds_qset_prop(qos, (property + "library.finalize").c_str(), ("finalize_" + calls).c_str());
   }
   const std::pair<const char*, const char*> files[] = {{"dds.sec.auth.identity_ca", security::kIdentityCa},
                                                        {"dds.sec.auth.identity_certificate", security::kCertificate},
