@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""skipped.py BUILD [LIST [--but-stalled]]: names each test that ctest's last run in BUILD skipped, and why.
+"""skipped.py BUILD [LIST [--again]]: names each test that ctest's last run in BUILD skipped, and why.
 
 Exit 1 where one gives no reason that a machine can have (tests/support/skip.sh); with LIST, also where one is not in it. A line
-of LIST is a test's name, a space and the reason; it has five lines at most. --but-stalled: those that only a machine that stood
-still skipped need not be in LIST; they alone are printed, as an expression for ctest -R, to be tried again.
+of LIST is a test's name, a space and the reason; it has five lines at most. --again: what is to be tried again is printed alone, as
+an expression for ctest -R: what failed, and what only a machine that stood still skipped, which then need not be in LIST.
 """
 import pathlib
 import re
@@ -26,6 +26,11 @@ def skipped(results: pathlib.Path) -> dict[str, str | None]:
     return told
 
 
+def failed(results: pathlib.Path) -> list[str]:
+    """Names of the tests that failed."""
+    return [case.get("name") for case in ElementTree.parse(results).iter("testcase") if case.find("failure") is not None]
+
+
 def main() -> int:
     results = pathlib.Path(sys.argv[1]) / "tests.xml"
     told = skipped(results) if results.exists() else {}
@@ -37,8 +42,9 @@ def main() -> int:
             print(f"{sys.argv[2]}: {len(allowed)} tests may be skipped, five at most")
             return 1
     wrong = 0
-    again = sorted(name for name, reason in told.items() if len(sys.argv) > 3 and (reason or "").startswith("stalled: "))
-    if len(sys.argv) > 3:
+    again = []
+    if len(sys.argv) > 3 and results.exists():
+        again = sorted([name for name, reason in told.items() if (reason or "").startswith("stalled: ")] + failed(results))
         print("|".join(f"^{re.escape(name)}$" for name in again))
     for name, reason in sorted(told.items()):
         complaint = ""

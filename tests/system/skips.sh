@@ -78,11 +78,13 @@ expect 1 "a_test: no reason" "$judge" .
 results "$(case_of another 'skipped: right: root')"
 expect 0 "another: right: root" "$judge" .
 expect 1 "another: right: root <- FAILED: not in list" "$judge" . list
-expect 1 "another: right: root <- FAILED: not in list" "$judge" . list --but-stalled
+expect 1 "another: right: root <- FAILED: not in list" "$judge" . list --again
 results "$(case_of a_test 'skipped: device: none')$(case_of b_test 'skipped: stalled: b_test: 180 ms')$(case_of c_test 'skipped: stalled: 9 ms')"
 expect 1 "c_test: stalled: 9 ms <- FAILED: not in list" "$judge" . list
-[[ $("$judge" . list --but-stalled 2>/dev/null) == '^b_test$|^c_test$' ]] || die "not to be tried again: $("$judge" . list --but-stalled)"
+[[ $("$judge" . list --again 2>/dev/null) == '^b_test$|^c_test$' ]] || die "not to be tried again: $("$judge" . list --again)"
+results '<testcase name="wrong" status="fail"><failure/></testcase>'"$(case_of c_test 'skipped: stalled: 9 ms')"
+[[ $("$judge" . list --again 2>/dev/null) == '^c_test$|^wrong$' ]] || die "not to be tried again: $("$judge" . list --again)"
 results "$(case_of a_test 'skipped: device: none')"
-[[ -z $("$judge" . list --but-stalled 2>/dev/null) ]] || die "nothing is to be tried again"
+[[ -z $("$judge" . list --again 2>/dev/null) ]] || die "nothing is to be tried again"
 printf 'test_%d reason\n' 1 2 3 4 5 6 >list
 expect 1 "five at most" "$judge" . list
