@@ -40,8 +40,8 @@ def main() -> int:
             for name in types_of(path.read_text()):
                 files.setdefault(name, []).append(str(path.relative_to(root)))
     wrong = [f"{name} is defined in {' and '.join(where)}" for name, where in sorted(files.items()) if len(where) > 1]
-    if len(files) < 500:
-        wrong.append(f"only {len(files)} types were found")
+    if not files:
+        wrong.append("no types were found")
     for line in wrong:
         print(line)
     return 1 if wrong else 0
