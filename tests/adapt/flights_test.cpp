@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Short forms of tests/nightly/adapt.sh.
+// Short forms of adapt_gate (tests/gusts).
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # A ground station behind a bad line: 30 % loss, 50 to 100 ms of delay, 1 Mbit/s (bad_link.py; below row 46 of docs/faults.md). A map
 # arrives, or both ends are told how far it came; commands come through beside it, and the vehicle's own odometry does not notice.
-#   daemon_bad_link.sh SOURCE_DIR BUILD_DIR [BYTES]     BYTES: of a further map, whose time is told; tests/nightly/bad_link.sh
+#   daemon_bad_link.sh SOURCE_DIR BUILD_DIR [BYTES]     BYTES: of a further map, whose time is told (5 minutes for 20900000)
 set -euo pipefail
 source_dir=$1 build=$2 large=${3:-}
 if [[ ${4:-} != inside ]]; then
