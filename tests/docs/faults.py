@@ -38,8 +38,6 @@ def main() -> int:
     tests, parts = known_tests(build), nightly_parts(source)
     wrong, numbers = [], []
     wrong += [f"{t} is named by a row's number, which says nothing of what it claims" for t in tests if re.search(r"\b[Rr]ow_?\d", t)]
-    if len(tests) < 500:
-        wrong.append(f"ctest -N tells of {len(tests)} tests only: build everything first")
     for number, fault, _, reaction, named in rows_of(text):
         if number:
             numbers.append(int(number))
