@@ -15,7 +15,7 @@ namespace backwash::firmware_bridge {
 
 /// HEARTBEAT.autopilot that stands for a controller behind a PlainPort. No MAVLink autopilot has this number.
 
-/// A serial line to a controller that speaks the plain link (plain/README.md), as a port of MAVLink frames: what
+/// A serial line to a controller that speaks the plain link (docs/plain_link.md), as a port of MAVLink frames: what
 /// AutopilotLink writes is put on the line as plain frames, and what the controller says is read as MAVLink frames. So
 /// everything above it, from telemetry to the raw log, is the same for both. What the plain link has no frame for is
 /// not sent: TIMESYNC, STATUSTEXT, parameters, message intervals.

@@ -11,7 +11,7 @@ namespace backwash::config {
 /// What is spoken on the link.
 enum class LinkProtocol {
   mavlink,
-  plain,  ///< firmware_bridge/plain/README.md, on a serial port
+  plain,  ///< docs/plain_link.md, on a serial port
 };
 
 /// What [link] device names.

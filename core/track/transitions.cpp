@@ -8,7 +8,7 @@ namespace {
 constexpr ModeSet kEnabling = set_of({Mode::enabling}), kTracking = set_of({Mode::tracking});
 constexpr ModeSet kHold = set_of({Mode::hold}), kLand = set_of({Mode::land}), kLifting = set_of({Mode::lifting});
 
-// core/track/README.md shows this table; a test compares the two.
+// docs/modes.md shows this table; a test compares the two.
 constexpr Transition kTransitions[] = {
     // Without a working link or a working clock nothing may be streamed.
     {kCommanding, Reason::port_lost, Mode::quiet},

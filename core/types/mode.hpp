@@ -9,7 +9,7 @@
 
 namespace backwash {
 
-/// What the daemon does with the vehicle. core/track/README.md has the transition table.
+/// What the daemon does with the vehicle. docs/modes.md has the transition table.
 enum class Mode : std::uint8_t {
   passive,   ///< nothing is commanded; an operator has to enable
   enabling,  ///< set-points of the present place are streamed until the autopilot follows them
@@ -75,7 +75,7 @@ enum class Reason : std::uint8_t {
 /// In what two descriptions of the same motion contradict each other: an axis of the map, or an angle.
 enum class Mismatch : std::uint8_t { none, x, y, z, yaw, roll, pitch };
 
-// What they are called in the status, in logs and in core/track/README.md, in the enumerations' order.
+// What they are called in the status, in logs and in docs/modes.md, in the enumerations' order.
 inline constexpr std::array kModeNames{"passive", "enabling", "tracking", "hold", "land", "quiet", "lifting"};
 inline constexpr std::array kMismatchNames{"none", "x", "y", "z", "yaw", "roll", "pitch"};
 inline constexpr std::array kReasonNames{

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
-/* The plain serial link between backwash and a flight controller without MAVLink: README.md beside this file.
+/* The plain serial link between backwash and a flight controller without MAVLink: docs/plain_link.md.
  *
  * C99, for both ends and for any microcontroller: no allocation, no library, no global state, no recursion, and every
  * loop is bounded by the size of a frame. One byte in costs a few instructions, the last one of a frame its checksum.

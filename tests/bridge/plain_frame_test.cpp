@@ -15,7 +15,7 @@ using mavlink::test::operator+;
 
 /// The examples of the link's document, which were made by another implementation.
 std::map<std::string, Bytes> examples() {
-  std::ifstream document(std::string(BACKWASH_SOURCE_DIR) + "/firmware_bridge/plain/README.md");
+  std::ifstream document(std::string(BACKWASH_SOURCE_DIR) + "/docs/plain_link.md");
   std::map<std::string, Bytes> found;
   for (std::string line; std::getline(document, line);) {
     std::istringstream words(line);

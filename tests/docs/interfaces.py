@@ -197,12 +197,6 @@ def check_mavlink(root: pathlib.Path, sections_of: dict[str, str]) -> None:
     cells = " ".join(c[0] for c in rows(section))
     words = set(re.findall(r"\b[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*\b", cells + section.split("The codec knows more")[1].split("\n\n")[0]))
     expect("MAVLink messages", words, actual)
-    message = r"\b[A-Z][A-Z]+(?:_[A-Z]+)*\b"
-    bridge = rows(sections((root / "firmware_bridge/README.md").read_text())["Messages"])
-    for way, cell in (("out", 0), ("in", 2)):
-        table = section.split(f"| {way} |")[1].split("\n\n")[0]
-        told = {m for c in rows(table) for m in re.findall(message, c[0])}
-        expect(f"MAVLink messages {way} of firmware_bridge/README.md", {m for c in bridge for m in re.findall(message, c[cell])}, told)
 
 
 def main() -> int:

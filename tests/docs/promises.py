@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What core/study/README.md promises of names and sizes is what the rows of core/study/confusion.md show.
+"""What core/study/README.md promises of names and sizes is what the rows of docs/measurements/confusion.md show.
 
 promises.py SOURCE_DIR
 """
@@ -19,11 +19,11 @@ def rows(text: str) -> dict[str, list[tuple[int, int]]]:
 
 def main() -> int:
     study = pathlib.Path(sys.argv[1]) / "core/study"
-    all_ = rows((study / "confusion.md").read_text())
+    all_ = rows((study.parents[1] / "docs/measurements/confusion.md").read_text())
     causes = {name: row for name, row in all_.items() if re.fullmatch(r"[a-z_]+", name) and name not in ("unknown", "none")}
     alike = {name: row for name, row in all_.items() if "," in name}
     if len(causes) < 15 or len(alike) < 3 or "none" not in all_:
-        print(f"core/study/confusion.md: only {len(causes)} causes and {len(alike)} confounded rows were read")
+        print(f"docs/measurements/confusion.md: only {len(causes)} causes and {len(alike)} confounded rows were read")
         return 1
     right, wrong = [row[0][0] for row in causes.values()], [row[2][0] for row in causes.values()]
     worlds = {row[0][1] for row in causes.values()}

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# The study against worlds with hidden effects: the tables of core/study/confusion.md. The matrix is a campaign in the folder
+# The study against worlds with hidden effects: the tables of docs/measurements/confusion.md. The matrix is a campaign in the folder
 # FILE-campaign: what was cut goes on with the next call of the same SEED and FILE. Exit 1: a gate is missed.
 # usage: study.sh STUDY_MATRIX [WORLDS per cell] [SEED] [FILE]   (STUDY_MATRIX: build/…/tests/study_worlds/study_matrix)
 set -euo pipefail

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a world holds, by counting what is allocated: the table of core/plan/README.md is read and held against it.
+// What a world holds, by counting what is allocated: the table of docs/measurements/world_memory.md is read and held against it.
 #include <gtest/gtest.h>
 #include <malloc.h>
 
@@ -73,12 +73,12 @@ std::vector<double> bytes_per_voxel(const map::OccupancyGrid& grid) {
   return bytes;
 }
 
-/// A column of the README's table, from the row of bounds on to that of all.
+/// A column of the document's table, from the row of bounds on to that of all.
 std::vector<double> documented(int column) {
-  std::ifstream readme(BACKWASH_SOURCE_DIR "/core/plan/README.md");
+  std::ifstream document(BACKWASH_SOURCE_DIR "/docs/measurements/world_memory.md");
   std::vector<double> values;
   bool within = false;
-  for (std::string line; std::getline(readme, line);) {
+  for (std::string line; std::getline(document, line);) {
     within = within || line.starts_with("| bounds, ");
     if (!within || !line.starts_with("|")) continue;
     std::istringstream cells(line);

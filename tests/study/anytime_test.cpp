@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Evidence that may be looked at after every flight (core/study/inference/anytime.md).
+// Evidence that may be looked at after every flight (docs/model.md section 8).
 #include "core/study/inference/anytime.hpp"
 
 #include <gtest/gtest.h>

@@ -140,7 +140,7 @@ TEST(CalibrateIntervals, CoverTheConstantsThatMadeTheData) {
       inside += c.ci95[p].low <= wanted[p] && wanted[p] <= c.ci95[p].high ? 1 : 0, all += 1;
     }
   }
-  // 0.909 over 25 campaigns (README.md); 16 campaigns scatter by about 0.02.
+  // 0.909 over 25 campaigns (docs/measurements/calibration.md); 16 campaigns scatter by about 0.02.
   EXPECT_GE(static_cast<double>(inside) / all, 0.86);
   EXPECT_LE(static_cast<double>(inside) / all, 0.995);
 }

@@ -162,7 +162,7 @@ TEST(Dependence, AutocorrelationAloneIsNotDependence) {
     shuffled += independence(x(order), y(order), first_of(), 199, draw).p <= 0.05 ? 1 : 0;
   }
   RecordProperty("rejected", rejected), RecordProperty("shuffled", shuffled);
-  EXPECT_LE(rejected, 18);  // 99 % of runs of a test of size 0.05; 1,500 draws gave 0.065 (README.md)
+  EXPECT_LE(rejected, 18);  // 99 % of runs of a test of size 0.05; 1,500 draws gave 0.065 (docs/model.md section 8)
   EXPECT_GE(shuffled, 60);
 }
 

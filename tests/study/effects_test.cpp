@@ -51,12 +51,12 @@ TEST(Effects, EveryEffectIsHiddenByTheGenerator) {
 }
 
 TEST(Effects, EveryEffectHasItsSizeAndItsRowInTheConfusion) {
-  const std::string text = text_of(BACKWASH_SOURCE_DIR "/core/study/confusion.md");
+  const std::string text = text_of(BACKWASH_SOURCE_DIR "/docs/measurements/confusion.md");
   const std::string sizes = text.substr(0, text.find("\n## Confusion"));
   ASSERT_LT(sizes.size(), text.size());
   for (const Effect& e : effects()) {
-    EXPECT_NE(sizes.find(e.name), std::string::npos) << e.name << " has no size in core/study/confusion.md";
-    EXPECT_NE(self_test().of(e.name), nullptr) << e.name << " has no row in core/study/confusion.md";
+    EXPECT_NE(sizes.find(e.name), std::string::npos) << e.name << " has no size in docs/measurements/confusion.md";
+    EXPECT_NE(self_test().of(e.name), nullptr) << e.name << " has no row in docs/measurements/confusion.md";
   }
 }
 

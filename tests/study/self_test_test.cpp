@@ -30,7 +30,7 @@ TEST(SelfTest, HasEveryCauseOfTheCatalogueAndWhatIsNone) {
 }
 
 TEST(SelfTest, AgreesWithTheConfusionTable) {
-  std::ifstream file(BACKWASH_SOURCE_DIR "/core/study/confusion.md");
+  std::ifstream file(BACKWASH_SOURCE_DIR "/docs/measurements/confusion.md");
   std::stringstream text;
   text << file.rdbuf();
   const std::string table = text.str();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Causes that act in some of twelve flights (rates: study_shares, core/study/inference/some_flights.md).
+// Causes that act in some of twelve flights (rates: study_shares, docs/measurements/study.md).
 #include <gtest/gtest.h>
 #include <unistd.h>
 

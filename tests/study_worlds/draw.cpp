@@ -79,7 +79,7 @@ HiddenWorld draw_world(const Request& request) {
       draw_room(rng, request.confound == "height" || request.confound == "bob", request.confound == "fast" ? 2 : 1);
   world.craft = draw_craft(rng);
   Rng rotors(request.seed * 104729 + 3);
-  world.craft.rotor_spread = between(rotors, 0.05, 0.15);  // of real craft, core/study/recordings.md
+  world.craft.rotor_spread = between(rotors, 0.05, 0.15);  // of real craft, docs/measurements/recordings.md
   world.rate_hz = between(rng, 0, 1) < 0.7 ? 50 : between(rng, 0, 1) < 0.5 ? 100 : 40;
   world.jitter = between(rng, 0, 0.3);
   world.ln_var_vehicle = 0.55 * std::normal_distribution()(rng);

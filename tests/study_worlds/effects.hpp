@@ -30,7 +30,7 @@ using Truth = std::function<std::optional<double>(double s, double shape)>;
 
 /// All that the generator knows of a cause. One that is no push and no factor on the variance acts in fly.cpp.
 struct HiddenCause {
-  double size;              ///< that must be found at 12 flights; table and units: core/study/confusion.md
+  double size;              ///< that must be found at 12 flights; table and units: docs/measurements/confusion.md
   bool one_signed = false;  ///< else its sign is drawn
   std::function<double(std::mt19937_64&)> shape = {};     ///< draws the second number; without it a direction, rad
   std::function<Vec3(const Acting&)> push = {};           ///< on the craft, m/s² in W

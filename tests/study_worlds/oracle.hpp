@@ -6,8 +6,8 @@
 
 namespace study_worlds {
 
-/// The estimated parameters of which the generator knows the value in the same unit (README.md of the study lists
-/// them); empty for a cause without one.
+/// The estimated parameters of which the generator knows the value in the same unit (drag at
+/// 1 m/s, a map offset as the map file shows it); empty for a cause without one.
 std::vector<Compared> compare(const HiddenWorld& world, const std::vector<Table>& flights,
                               const backwash::study::Accepted& found);
 /// Share of a channel's variance between windows that the hidden effect's window means explain, largest of all

@@ -21,7 +21,7 @@ using Vec3 = Eigen::Vector3d;
 struct Request {
   std::uint64_t seed = 1;
   std::vector<std::string> causes;  ///< cause_names(), or "unknown"; empty: none
-  double size = 1;                  ///< in units of the effect-size table (core/study/confusion.md)
+  double size = 1;                  ///< in units of the effect-size table (docs/measurements/confusion.md)
   int flights = 12;
   /// "yaw": never turns; "battery": all flights start full and equal; "height": an empty room, hovers at two heights
   /// only, low and under the ceiling; "bob": an empty room, up and down on sines

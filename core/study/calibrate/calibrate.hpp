@@ -20,7 +20,7 @@ struct Refusal {
 };
 
 /// What the geometry of the flights leaves undetermined, before anything is fitted: gates as in the base model. Empty
-/// if every parameter can be had. The rules are in README.md.
+/// if every parameter can be had. The rules are in core/study/calibrate/README.md.
 std::vector<Refusal> refusals(const Data& data, const Model& gates);
 
 struct Interval {

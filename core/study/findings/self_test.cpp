@@ -62,7 +62,7 @@ std::string self_test_section(const std::vector<std::string>& names) {
   const SelfTest& test = self_test();
   std::string text = "<section><h2>How often the method is right</h2>\n<p>" + std::to_string(test.flights) +
                      " made flights each, by a generator with other formulas, effects of the size of the table in "
-                     "core/study/confusion.md, seed " +
+                     "docs/measurements/confusion.md, seed " +
                      std::to_string(test.seed) + ".</p>\n<table>\n";
   for (const auto& name : names)
     if (const auto* r = test.of(name)) text += shown(*r);

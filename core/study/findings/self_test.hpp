@@ -11,11 +11,11 @@ namespace backwash::study {
 /// What a world hides.
 enum class Hidden {
   cause,      ///< of the catalogue
-  structure,  ///< something outside the catalogue: `unknown` in core/study/confusion.md
+  structure,  ///< something outside the catalogue: `unknown` in docs/measurements/confusion.md
   nothing,    ///< `none`
 };
 
-/// How worlds that hide one thing, at the size of core/study/confusion.md, were told: a row of its table.
+/// How worlds that hide one thing, at the size of docs/measurements/confusion.md, were told: a row of its table.
 struct SelfTestRow {
   Hidden hidden;
   const char* cause;  ///< its name; empty where none of the catalogue is hidden
@@ -26,7 +26,7 @@ struct SelfTestRow {
   const char* other;  ///< what was told most often instead; empty: nothing else was
 };
 
-/// The engine's published campaign: the rows of core/study/confusion.md as the library was built
+/// The engine's published campaign: the rows of docs/measurements/confusion.md as the library was built
 /// (self_test_rows.cmake).
 struct SelfTest {
   std::uint64_t seed;

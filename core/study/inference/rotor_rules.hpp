@@ -8,7 +8,7 @@ namespace backwash::study {
 /// Constants of what is told of single rotors; printed behind the others by rules().
 struct RotorRules {
   Rule rotor_spread{"rotor_spread", 0.15, "1",
-                    "measured: rotors of a sound craft differ by 5 to 15 % (core/study/recordings.md)"};
+                    "measured: rotors of a sound craft differ by 5 to 15 % (docs/measurements/recordings.md)"};
   Rule spread_limit{"spread_limit", 2.5, "rotor_spread", "derived: the largest of four rotors passes it in 0.015"};
   Rule shaking_line{"shaking_line", 0.25, "ln power", "derived: as the floor of vibration"};
   Rule some_level{"some_level", 0.1, "of accept_p", "chosen: asked beside everything that all flights are asked"};

@@ -14,7 +14,7 @@ struct Rules {
   Rule flips{"flips", 1200, "draws", "derived: resolves a sixth of a third of accept_p, a further structure's level"};
   Rule accept_p{"accept_p", 0.015, "1",
                 "measured: at 0.03, 40 of 600 worlds without an effect raised alarms, at 0.015 5 of 249 "
-                "(core/study/confusion.md)"};
+                "(docs/measurements/confusion.md)"};
   Rule structure_share{"structure_share", 1.0 / 6, "of accept_p",
                        "chosen: structures gain much or little, and the catalogue's names shall lose little"};
   Rule dependence_share{"dependence_share", 1.0 / 6, "of accept_p", "chosen: as structure_share"};
@@ -29,7 +29,7 @@ struct Rules {
                         "chosen: a structure has 4 columns and more and bends to where a form is wrong"};
   Rule least_share{
       "least_share", 0.08, "of an accepted gain",
-      "chosen: the error of an accepted form gains less (core/study/confusion.md, two causes, has the price)"};
+      "chosen: the error of an accepted form gains less (docs/measurements/confusion.md, two causes, has the price)"};
   Rule repair_share{"repair_share", 0.25, "of an accepted gain",
                     "chosen: delays and slopes share one moment, so a form's error is larger there"};
   Rule left_share{"left_share", 1, "of an accepted gain",
@@ -52,7 +52,7 @@ struct Rules {
                     "chosen: a reference farther than a quarter outside of what was flown is an extrapolation"};
   // Scatter
   Rule motor_scatter{"motor_scatter", 0.01, "1",
-                     "chosen: so well do reference flights tell a rotor's share (core/study/inference/README.md); "
+                     "chosen: so well do reference flights tell a rotor's share (docs/measurements/recordings.md); "
                      "craft differ by rotor_spread"};
   Rule dropout_scatter{"dropout_scatter", 0.003, "1", "chosen: of readings, lost by a sound sensor"};
   Rule least_scatter{"least_scatter", 1e-8, "channel²", "derived: so that an exact channel can be divided by"};
@@ -105,7 +105,7 @@ struct Rules {
   // Rotors against sound flights
   Rule rotor_level{"rotor_level", 0.05, "1", "chosen: over the four rotors"};
   Rule rotor_of_interest{"rotor_of_interest", 0.06, "of one rotor's thrust",
-                         "derived: the size of core/study/confusion.md"};
+                         "derived: the size of docs/measurements/confusion.md"};
   Rule normal_80{"normal_80", 0.8416212, "1", "derived: quantile of the normal distribution at `power`"};
   Rule fewest_sound{"fewest_sound", 4, "flights", "derived: three contrasts and a scatter"};
   // Causes in some flights only
@@ -144,13 +144,13 @@ struct Rules {
   Rule least_variance{"least_variance", 1e-12, "(m/s²)²", "derived: so that a still window can be divided by"};
   Rule manoeuvre_windows{"manoeuvre_windows", 45, "windows", "derived: a flight of 90 s"};
   Rule manoeuvre_flights{"manoeuvre_flights", 12, "flights",
-                         "derived: the flights of the campaigns (core/study/confusion.md)"};
+                         "derived: the flights of the campaigns (docs/measurements/confusion.md)"};
   Rule manoeuvre_nats{"manoeuvre_nats", 0.5, "nats", "derived: as least_threshold"};
   // What it changes for a flight
   Rule places{"places", 60, "windows", "chosen: of all that were flown, at which hover sets are computed"};
   Rule told_quantile{"told_quantile", 0.95, "1", "chosen: of the hover sets, told beside the median"};
   Rule plan_deadline{"plan_deadline", 3, "s",
-                     "measured: twelve times what 95 % of backwash compare's plans take, 247 ms (core/sim/compare.md)"};
+                     "measured: twelve times what 95 % of backwash compare's plans take, 247 ms (docs/measurements/compare.md)"};
   Rule least_route{"least_route", 0.3, "m", "chosen: between places that are nearer no plan is told"};
   Rule fewest_compared{"fewest_compared", 8, "windows", "chosen: in which a channel is simulated beside measured"};
   Rule picture_groups{"picture_groups", 12, "groups", "chosen: of windows, whose means a picture draws"};

@@ -26,7 +26,7 @@ std::vector<DesignColumn> others(const CauseSearchResult& found, const Form& own
 }
 
 /// Rotors tell by channels of their own what is the matter with them, and other flights' scatter there is small. Pushes
-/// and tails differ between flights for too many reasons (some_flights.md).
+/// and tails differ between flights for too many reasons.
 std::vector<Amplitudes> all_amplitudes(const Evidence& evidence, const CauseSearchResult& found) {
   std::vector<Amplitudes> all;
   for (const Form* form : catalogue()) {

@@ -7,7 +7,7 @@ namespace backwash::study {
 
 /// Every constant that decides what a log's windows are and what is measured on them (`backwash study --rules`).
 /// Members are rules and nothing else: the printed list is the struct itself. What halving and doubling them does:
-/// README.md.
+/// docs/measurements/window_rules.md.
 struct WindowRules {
   // Windows and gates, for calibration and study alike (WindowOptions)
   Rule window_length{"window_length", 2, "s",
@@ -20,40 +20,44 @@ struct WindowRules {
   Rule gap{"gap", 0.05, "s", "derived: the period of 20 Hz, the least rate of a log: farther apart is a gap"};
   Rule gap_periods{
       "gap_periods", 5, "median periods",
-      "measured: halved and doubled, up to 5 of 33 windows change and no name (core/study/windows/README.md)"};
-  Rule frozen{"frozen", 0.1, "s",
-              "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md); five "
-              "control periods"};
-  Rule frozen_rows{"frozen_rows", 4, "rows",
-                   "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md); a "
-                   "tracker of half the log's rate repeats each position once"};
+      "measured: halved and doubled, up to 5 of 33 windows change and no name (docs/measurements/window_rules.md)"};
+  Rule frozen{
+      "frozen", 0.1, "s",
+      "measured: halved and doubled no window of the recordings changes (docs/measurements/window_rules.md); five "
+      "control periods"};
+  Rule frozen_rows{
+      "frozen_rows", 4, "rows",
+      "measured: halved and doubled no window of the recordings changes (docs/measurements/window_rules.md); a "
+      "tracker of half the log's rate repeats each position once"};
   Rule perched_spread{"perched_spread", 0.0003, "m",
                       "measured: halved and doubled no window of the recordings changes "
-                      "(core/study/windows/README.md); hovers move by 10 mm"};
+                      "(docs/measurements/window_rules.md); hovers move by 10 mm"};
   Rule perched_thrust{"perched_thrust", 0.6, "of the weight",
                       "derived: below every hover, of a thrust curve that may be 30 % off"};
   Rule idle{"idle", 0.05, "of the full command",
-            "measured: halved and doubled no window of the recordings changes (core/study/windows/README.md)"};
-  Rule clear{"clear", 0.005, "m",
-             "measured: halved and doubled, 4 of 33 windows change and no name (core/study/windows/README.md): nearer, "
-             "feet may touch"};
-  Rule rotor_limit{"rotor_limit", 0.01, "of the full command",
-                   "measured: halved and doubled, 1 of 69 windows changes (core/study/windows/README.md); no rotor "
-                   "hovers near either end"};
+            "measured: halved and doubled no window of the recordings changes (docs/measurements/window_rules.md)"};
+  Rule clear{
+      "clear", 0.005, "m",
+      "measured: halved and doubled, 4 of 33 windows change and no name (docs/measurements/window_rules.md): nearer, "
+      "feet may touch"};
+  Rule rotor_limit{
+      "rotor_limit", 0.01, "of the full command",
+      "measured: halved and doubled, 1 of 69 windows changes (docs/measurements/window_rules.md); no rotor "
+      "hovers near either end"};
   Rule saturated_share{"saturated_share", 0.02, "of a window's rows",
                        "measured: halved and doubled, 4 of 69 windows change and no name "
-                       "(core/study/windows/README.md); two rows at 50 Hz"};
+                       "(docs/measurements/window_rules.md); two rows at 50 Hz"};
   Rule still_speed{"still_speed", 0.12, "m/s",
                    "measured: halved, half of the hovers are lost; doubled, transits among them are named as causes "
-                   "(core/study/windows/README.md)"};
+                   "(docs/measurements/window_rules.md)"};
   Rule still_time{
       "still_time", 0.5, "s",
-      "measured: halved and doubled, up to 5 of 33 windows change and no name (core/study/windows/README.md)"};
+      "measured: halved and doubled, up to 5 of 33 windows change and no name (docs/measurements/window_rules.md)"};
   Rule still_enough{"still_enough", 0.8, "of still_time",
                     "derived: rows at 10 Hz are 0.4 s apart at most within still_time"};
-  Rule inconsistent{
-      "inconsistent", 0.15, "m/s",
-      "measured: halved, 2 windows of the recordings are lost; doubled, none changes (core/study/windows/README.md)"};
+  Rule inconsistent{"inconsistent", 0.15, "m/s",
+                    "measured: halved, 2 windows of the recordings are lost; doubled, none changes "
+                    "(docs/measurements/window_rules.md)"};
   Rule still_command{"still_command", 0.01, "m/s",
                      "derived: a set-point that rests moves by rounding alone, 5 mm over still_time"};
   Rule rate_share{"rate_share", 0.4, "of the rate", "derived: as band_high at 50 Hz; half the rate would fold back"};
@@ -78,9 +82,10 @@ struct WindowRules {
   Rule loop_drag{"loop_drag", 0.2, "1/s", "derived: small enough that twice as much slows twice as much"};
   Rule command_age{"command_age", 0.25, "periods",
                    "derived: a held command is half a period old on the mean, a streamed one not: the middle"};
-  Rule slope_time{"slope_time", 0.06, "s",
-                  "measured: halved and doubled nothing told of the recordings changes (core/study/windows/README.md); "
-                  "it loses 2 % of what moves at 2 Hz"};
+  Rule slope_time{
+      "slope_time", 0.06, "s",
+      "measured: halved and doubled nothing told of the recordings changes (docs/measurements/window_rules.md); "
+      "it loses 2 % of what moves at 2 Hz"};
   Rule slope_rows{"slope_rows", 1000, "rows", "derived: slope_time at 33 kHz, which no log has: a broken rate"};
   Rule stamp_error{"stamp_error", 1e-9, "s", "derived: rounding of a stamp, and no flight's rows are so near"};
   Rule row_error{"row_error", 1e-6, "rows", "derived: rounding of a stretch's length over its period"};
@@ -89,12 +94,12 @@ struct WindowRules {
   // Where a window was flown
   Rule stray{"stray", 0.3, "m",
              "measured: halved, forward_speed is 1.041 in place of 1.030; doubled, nothing changes "
-             "(core/study/windows/README.md)"};
+             "(docs/measurements/window_rules.md)"};
   Rule sunk{"sunk", 0.5, "of g",
             "derived: the heaviest payload that is possible lets a craft hover so much over k_p below its set-point"};
-  Rule one_place{
-      "one_place", 0.05, "m",
-      "measured: halved and doubled no window, name or size of the recordings changes (core/study/windows/README.md)"};
+  Rule one_place{"one_place", 0.05, "m",
+                 "measured: halved and doubled no window, name or size of the recordings changes "
+                 "(docs/measurements/window_rules.md)"};
   Rule offset_retreat{"offset_retreat", 0.25, "of an offset",
                       "derived: 0.1 m of the farthest, a voxel: so far at a time back out of a solid"};
   Rule offset_limit{"offset_limit", 2, "ln variance", "chosen: as ln_variance_limit; the map is then wrong by more"};
@@ -114,19 +119,20 @@ struct WindowRules {
   // Means and variances
   Rule scatter2{"scatter2", 0.16, "(ln variance)²",
                 "measured: halved and doubled no name or size of the recordings changes "
-                "(core/study/windows/README.md); anova measures the scatter that counts"};
-  Rule mean_noise{"mean_noise", 0.002, "(m/s²)²",
-                  "measured: halved and doubled nothing told of the recordings changes (core/study/windows/README.md); "
-                  "0.045 m/s² of offset"};
+                "(docs/measurements/window_rules.md); anova measures the scatter that counts"};
+  Rule mean_noise{
+      "mean_noise", 0.002, "(m/s²)²",
+      "measured: halved and doubled nothing told of the recordings changes (docs/measurements/window_rules.md); "
+      "0.045 m/s² of offset"};
   Rule mean_unit{"mean_unit", 0.01, "(m/s²)²",
                  "derived: the unit of the weights, in which the scatter is estimated too"};
   Rule least_gusts{"least_gusts", 0.2, "of a window's variance",
-                   "measured: halved and doubled, sizes change by less than 0.1 % (core/study/windows/README.md)"};
+                   "measured: halved and doubled, sizes change by less than 0.1 % (docs/measurements/window_rules.md)"};
   Rule fewest_spread{"fewest_spread", 4, "rows", "derived: two more than a variance and a correlation take"};
   Rule correlated{"correlated", 0.98, "1", "derived: at it a window of 100 rows is worth 2 samples, the least"};
   Rule noise_near{"noise_near", 0.3, "s",
                   "measured: halved and doubled, a kurtosis of 1.09 becomes 1.07 and 1.32 "
-                  "(core/study/windows/README.md); two times tau_w"};
+                  "(docs/measurements/window_rules.md); two times tau_w"};
   Rule noise_far{"noise_far", 1, "s", "derived: half a window"};
   Rule noise_between{"noise_between", 0.05, "s", "derived: a third of a gust's correlation time"};
   Rule noise_overlap{"noise_overlap", 5, "rows", "chosen: a lag that leaves fewer products is none"};
@@ -135,9 +141,10 @@ struct WindowRules {
   // Thrust and command delays
   Rule excited_level{
       "excited_level", 0.05, "m/s²",
-      "measured: halved and doubled, thrust_slope changes by at most 0.3 % (core/study/windows/README.md)"};
-  Rule excited_rate{"excited_rate", 0.05, "m/s³",
-                    "measured: halved and doubled, sizes change by less than 0.1 % (core/study/windows/README.md)"};
+      "measured: halved and doubled, thrust_slope changes by at most 0.3 % (docs/measurements/window_rules.md)"};
+  Rule excited_rate{
+      "excited_rate", 0.05, "m/s³",
+      "measured: halved and doubled, sizes change by less than 0.1 % (docs/measurements/window_rules.md)"};
   Rule slow_tilt{
       "slow_tilt", 0.45, "s",
       "measured: below 0.3 s the order of the attitude loop is told as a lag (tests/other_worlds, sluggish)"};

@@ -79,7 +79,7 @@ class Controller {
   void request(const plain_command_t& c) {
     ++requests_;
     asked_ = {c.sequence, 0, now_};
-    // Our duty, whatever the daemon believes (plain/README.md): nothing is disarmed that may be in the air.
+    // Our duty, whatever the daemon believes (docs/plain_link.md): nothing is disarmed that may be in the air.
     if (c.request == PLAIN_REQUEST_DISARM && !on_ground()) return;
     if (c.request == PLAIN_REQUEST_FOLLOW) vehicle_.send_follow_setpoints(), asked_.command = kCommandSetMode;
     if (c.request == PLAIN_REQUEST_ARM) vehicle_.send_arm(true), asked_.command = kCommandArm;
