@@ -53,7 +53,6 @@ PLANTED = [
     (SIZES, "tests/daemon/traps.cpp", "TEST(Trap, Closes) {}\n", "tests/daemon/traps.cpp holds tests"),
     (GLOSSARY, "README.md", "The GPHX is told by PHXQ. ", ""),
     (GLOSSARY, "README.md + core/README.md", "The PHXQ is told. ", "'PHXQ' is used by 2 documents"),
-    (GLOSSARY, "README.md + core/README.md + docs/faults.md", "A safe view of it. ", "'safe view' is a type and a word"),
 ]
 
 
