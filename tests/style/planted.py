@@ -49,7 +49,6 @@ PLANTED = [
     (TYPES, TRACK, "namespace backwash::track {\nclass Tracker;\nvoid f() { struct Tracker {}; }\n}\n", ""),
     (GLOSSARY, "README.md", "The GPHX is told by PHXQ. ", ""),
     (GLOSSARY, "README.md + core/README.md", "The PHXQ is told. ", "'PHXQ' is used by 2 documents"),
-    (GLOSSARY, "README.md + core/README.md + docs/faults.md", "A safe view of it. ", "'safe view' is a type and a word"),
 ]
 
 
