@@ -47,7 +47,7 @@ def main() -> int:
                  if not any(message.partition("…")[0] == text for message in messages))
     modes = (root / "core/types/mode.hpp").read_text()
     reasons = set(re.findall(LITERAL, re.search(r"kReasonNames\{(.*?)\};", modes, re.S)[1]))
-    listed = [reason for row in rows(part["In flight: what it did, and what to do"])[1:] for reason in row[0].split("; ")]
+    listed = [reason for row in rows(part["In flight: what to do"])[1:] for reason in row[0].split("; ")]
     expect("reasons", set(listed), reasons)
     wrong.extend(f"reason '{r}' stands twice" for r in set(listed) if listed.count(r) > 1)
     keys = {k for row in rows(sections((root / "docs/interfaces.md").read_text())["Vehicle file"])[1:] for k in quoted(row[0])}
