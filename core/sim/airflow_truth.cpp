@@ -10,7 +10,8 @@
 namespace backwash::sim {
 namespace {
 
-// Constants of core/sim/README.md. Variances in (m/s²)², lengths in m, pushes in m/s², times in s; a 5-inch vehicle.
+// Chosen (core/sim/README.md says what they lead to). Variances in (m/s²)², lengths in m, pushes in m/s², times in s; a
+// 5-inch vehicle.
 struct HorizontalVertical {
   double horizontal, vertical;
 };

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The real-time proofs that need minutes, the wall clock or another compiler. CI calls it nightly.
 #   realtime.sh [rtsan] [tsan] [asan] [fuzz] [rtps] [stress] [overload] [flood] [stops] [soak] [wall]      no argument: all of them
-# What each part proves, how long it takes and what it last measured: README.md here.
+# What each part proves, how long it takes: README.md here. Figures: docs/measurements/realtime.md.
 set -euo pipefail
 script=$(realpath "${BASH_SOURCE[0]}")
 cd "$(dirname "$script")/../.."

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a world holds, by counting what is allocated: the table of docs/measurements/world_memory.md is read and held against it.
+// What a world holds, by counting what is allocated: the table of docs/measurements/world_memory.md is read and held
+// against it.
 #include <gtest/gtest.h>
 #include <malloc.h>
 
