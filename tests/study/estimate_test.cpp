@@ -78,7 +78,8 @@ TEST(AveragedEstimate, LeavesAFortiethOfTheModelsDrawsBeyondEachEnd) {
   for (int i = 0; i < kDraws; ++i) {
     const Guess& g = guesses[which(rng)];
     const double x = g.value + g.error * normal(rng);
-    below += x<e.low, above += x> e.high;
+    below += x < e.low;
+    above += x > e.high;
     sum += x;
   }
   EXPECT_NEAR(below / double{kDraws}, 0.025, 0.0015);
