@@ -47,13 +47,17 @@ Port AutopilotLink::reconnect(Port port, Time now) noexcept {
   std::swap(port_, port);
   opened_at_ = now;
   heard_.reset();
-  lost_.reset(), blocked_.reset();
+  lost_.reset();
+  blocked_.reset();
   parser_ = {};
   telemetry_ = Telemetry(known_);
   queue_.clear();
   budget_.forget();
-  clock_ = {}, offset_ = {}, loss_ = {};
-  asked_ns_ = {}, signed_rightly_ = false;
+  clock_ = {};
+  offset_ = {};
+  loss_ = {};
+  asked_ns_ = {};
+  signed_rightly_ = false;
   return port;
 }
 

@@ -93,7 +93,10 @@ class AutopilotLink {
   /// Called with each frame that was accepted from the line, and each that was handed to the port's queue: for a raw
   /// log. Must itself be real-time. Null: none.
   using Tap = void (*)(void* context, bool outgoing, std::span<const std::uint8_t> frame) noexcept;
-  void tap(Tap each, void* context) noexcept { tap_ = each, tap_context_ = context; }
+  void tap(Tap each, void* context) noexcept {
+    tap_ = each;
+    tap_context_ = context;
+  }
   /// Two set-points in a row did not get out, or the port has taken nothing for 0.2 s of what waits: set-points are not
   /// all that must get out (ArduPilot takes off without).
   bool transmit_stalled(Time now) const noexcept;

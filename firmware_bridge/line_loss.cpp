@@ -20,7 +20,8 @@ void LineLoss::heard(std::uint8_t sequence, std::uint64_t passed_over) noexcept 
   }
   const auto known = static_cast<int>(std::min<std::uint64_t>(passed_over - passed_over_, 255));
   newest().missing += static_cast<std::uint32_t>(std::max(gap - known, 0));
-  last_ = sequence, passed_over_ = passed_over;
+  last_ = sequence;
+  passed_over_ = passed_over;
 }
 
 void LineLoss::asked() noexcept {
@@ -35,7 +36,9 @@ std::optional<LineLoss::Shares> LineLoss::shares(bool datagrams, bool authentica
   double frames = 0, missing = 0, answered = 0;
   for (std::size_t back = 1; back <= kQuestions; ++back) {
     const Question& question = questions_[(asked_ - back) % questions_.size()];
-    frames += question.frames, missing += question.missing, answered += question.answered;
+    frames += question.frames;
+    missing += question.missing;
+    answered += question.answered;
   }
   if (answered == 0 || frames == 0) return std::nullopt;
   const double in = missing / (frames + missing);

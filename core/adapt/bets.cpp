@@ -48,7 +48,10 @@ void Bets::bet_rougher(const ErrorSquare& error) noexcept {
     const double x = excess(error, kRougher[k]);
     for (std::size_t j = 0; j < kStakes.size(); ++j) rougher_[k][j].times(1 + kStakes[j] * (x - 1));
     const double change = detect(since_[k], x, error.seconds), value = mean_value(rougher_[k]);
-    if (k == 0) highest_ = std::max(highest_, value), highest_change_ = std::max(highest_change_, change);
+    if (k == 0) {
+      highest_ = std::max(highest_, value);
+      highest_change_ = std::max(highest_change_, change);
+    }
     if (k == above_ && (value >= refuted_ || change >= kRunLength)) ++above_;
   }
 }
@@ -64,13 +67,17 @@ void Bets::bet_calmer(const ErrorSquare& error) noexcept {
 }
 
 void Bets::forget_calmer() noexcept {
-  calmer_ = {}, below_ = 0, calm_from_ = seconds_;
-  watched_ = 0, rose_ = false;
+  calmer_ = {};
+  below_ = 0;
+  calm_from_ = seconds_;
+  watched_ = 0;
+  rose_ = false;
 }
 
 bool Bets::add(const ErrorSquare& error) noexcept {
   const auto known = std::tuple(above(), below(), rose_);
-  seconds_ += error.seconds, ++count_;
+  seconds_ += error.seconds;
+  ++count_;
   for (int axis = 0; axis < 3; ++axis) beyond_ += error.square[axis] > kLevel * kLevel * most(error, axis, 1);
   bet_rougher(error);
   bet_calmer(error);

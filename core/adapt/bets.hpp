@@ -46,7 +46,9 @@ class Wealth {
   void times(double factor) noexcept {
     product_ *= factor;
     if (product_ > 1e-100 && product_ < 1e100) return;
-    ln_ += std::log(product_), product_ = 1, scale_ = std::exp(ln_);
+    ln_ += std::log(product_);
+    product_ = 1;
+    scale_ = std::exp(ln_);
   }
   /// 0 or infinite where a double holds no more; ln() knows it then too.
   double value() const noexcept { return scale_ * product_; }
@@ -81,7 +83,11 @@ class Bets {
   /// Whether above(), below() or rose() may have changed.
   bool add(const ErrorSquare& error) noexcept;
   /// From now on it is watched whether the variance is more than v > 0 times the model's (7-9).
-  void watch(double v) noexcept { watched_ = v, rose_ = false, watch_ = {}; }
+  void watch(double v) noexcept {
+    watched_ = v;
+    rose_ = false;
+    watch_ = {};
+  }
   bool rose() const noexcept { return rose_; }  ///< what is watched was refuted
   /// That it is calmer is shown anew, from data of now on, and nothing is watched.
   void forget_calmer() noexcept;

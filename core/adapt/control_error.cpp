@@ -32,7 +32,8 @@ ControlError::ControlError(const Vehicle& vehicle, const Gusts& gusts)
     const auto ticks = [&](double below) {
       return static_cast<int>(std::lround(reach::steady_error(step, below).memory / kControlPeriod));
     };
-    spacing_ = std::max(spacing_, ticks(kForgotten)), settled_ = std::max(settled_, ticks(kSettled));
+    spacing_ = std::max(spacing_, ticks(kForgotten));
+    settled_ = std::max(settled_, ticks(kSettled));
     const ColouredStep low(step.axis, gusts.tau_low_s, kControlPeriod);
     const double variance = reach::steady_error(step, kForgotten).variance;
     least_ = std::min(least_, reach::steady_error(low, kForgotten).variance / variance);
@@ -64,7 +65,8 @@ void ControlError::begin(const AirTick& tick) noexcept {
   covariance_ = unknown();
   centres_.fill({now.p_W, now.v_W, Vec3::Zero()});
   errors_ = {};
-  ticks_ = since_ = 0, mixed_ = false;
+  ticks_ = since_ = 0;
+  mixed_ = false;
   last_ = tick;
 }
 
@@ -76,7 +78,8 @@ void ControlError::step(const AirTick& before) noexcept {
     covariance_[static_cast<std::size_t>(axis)].advance(std::sqrt(before.sigma[axis]));
   std::copy_backward(centres_.begin(), centres_.end() - 1, centres_.end());
   centres_[0] = {now.p_W, now.v_W, centre_.acceleration()};
-  ++ticks_, ++since_;
+  ++ticks_;
+  ++since_;
 }
 
 // The noise of the measured position: what of an error does not lie between the one before and the one after.
@@ -96,7 +99,10 @@ void ControlError::measure(const AirTick& tick) noexcept {
 
 std::optional<ErrorSample> ControlError::add(const AirTick& given) noexcept {
   AirTick tick = given;
-  if (!finite(tick.command)) return last_.reset(), std::nullopt;
+  if (!finite(tick.command)) {
+    last_.reset();
+    return std::nullopt;
+  }
   if (tick.age_s && (!finite(tick) || *tick.age_s > kMostMissed * kControlPeriod)) tick.age_s.reset();
   const bool known = modelled(tick.sigma);
   refused_ += !known;
@@ -120,7 +126,8 @@ std::optional<ErrorSample> ControlError::add(const AirTick& given) noexcept {
                      {answer_.state().p_W, answer_.state().v_W, answer_.acceleration()}};
   for (int axis = 0; axis < 3; ++axis)
     sample.promised[axis] = std::pow(covariance_[static_cast<std::size_t>(axis)].position_deviation(), 2);
-  since_ = 0, mixed_ = false;
+  since_ = 0;
+  mixed_ = false;
   return sample;
 }
 

@@ -58,7 +58,11 @@ class ControlError {
   /// Real-time: wait-free, no allocation.
   std::optional<ErrorSample> add(const AirTick& tick) noexcept;
   /// Begins anew, the noise of the position too. Real-time: wait-free, no allocation.
-  void forget() noexcept { last_.reset(), squares_.setZero(), differences_ = 0; }
+  void forget() noexcept {
+    last_.reset();
+    squares_.setZero();
+    differences_ = 0;
+  }
   std::uint64_t refused() const noexcept { return refused_; }  ///< ticks that had no Σ, or no number in it
   double spacing_s() const noexcept { return static_cast<double>(spacing_) * kControlPeriod; }
   Vec3 noise() const noexcept { return squares_ / std::max(1, differences_); }  ///< variance of the position, m²

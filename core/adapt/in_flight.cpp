@@ -43,7 +43,10 @@ bool InFlight::bet(const ErrorSample& sample) noexcept {
     if (!sample.air) continue;
     const auto k = static_cast<std::size_t>(*sample.air);
     sums_[k][kind] += excess(square, 1);
-    if (kind == 0) changed = errors_[k].add(square), ++samples_[k];
+    if (kind == 0) {
+      changed = errors_[k].add(square);
+      ++samples_[k];
+    }
     if (kind == 2) changed = rest_[k].add(square) || changed;
   }
   return changed;
@@ -114,10 +117,15 @@ void InFlight::combine() noexcept {
 // All but what is kept.
 void InFlight::forget() noexcept {
   error_.forget();
-  errors_.fill(Bets(alpha_)), rest_.fill(Bets(alpha_));
-  constant_ = Remainder(error_.kp(), false), motion_ = Remainder(error_.kp(), true);
-  before_.fill(Vec3::Zero()), sums_ = {}, samples_ = {};
-  grown_ = kept_, calm_ = shown_ = kModelledAir;
+  errors_.fill(Bets(alpha_));
+  rest_.fill(Bets(alpha_));
+  constant_ = Remainder(error_.kp(), false);
+  motion_ = Remainder(error_.kp(), true);
+  before_.fill(Vec3::Zero());
+  sums_ = {};
+  samples_ = {};
+  grown_ = kept_;
+  calm_ = shown_ = kModelledAir;
   combine();
 }
 
@@ -128,15 +136,22 @@ bool InFlight::end() noexcept {
     if (cause(static_cast<AirClass>(k)) == Cause::air) kept_[k] = std::max(kept_[k], *rest_[k].above());
   const AirFactors grown = frozen_ ? grown_ : kept_;
   forget();
-  grown_ = grown, combine();
+  grown_ = grown;
+  combine();
   return factors_ != before || kept_ != kept;
 }
 
 bool InFlight::carry_out(AirOrder order) noexcept {
   const AirFactors before = factors_;
-  if (order == AirOrder::reset) kept_ = kModelledAir, forget();
+  if (order == AirOrder::reset) {
+    kept_ = kModelledAir;
+    forget();
+  }
   if (order == AirOrder::freeze) frozen_ = true;
-  if (order == AirOrder::thaw) frozen_ = false, grow();
+  if (order == AirOrder::thaw) {
+    frozen_ = false;
+    grow();
+  }
   return factors_ != before;
 }
 

@@ -17,7 +17,8 @@ ErrorSample Remainder::add(const ErrorSample& sample) noexcept {
     const Eigen::Vector4d Px = axis.P * x;
     const double spread = x.dot(Px) / variance, e = sample.e_W[k] - x.dot(axis.theta);
     left.e_W[k] = e;
-    left.promised[k] *= 1 + spread, left.noise[k] *= 1 + spread;
+    left.promised[k] *= 1 + spread;
+    left.noise[k] *= 1 + spread;
     const double gain = 1 / (variance * (1 + spread));
     axis.theta += gain * e * Px;
     axis.P -= gain * Px * Px.transpose();

@@ -141,7 +141,8 @@ toml::table model_table(const Model& model) {
     for (auto dot = rest.find('.'); dot != std::string_view::npos; dot = rest.find('.')) {
       auto& inner = *table->emplace<toml::table>(rest.substr(0, dot)).first->second.as_table();
       inner.is_inline(table != &whole);
-      table = &inner, rest.remove_prefix(dot + 1);
+      table = &inner;
+      rest.remove_prefix(dot + 1);
     }
     table->insert_or_assign(rest, rounded(*target, 6));
   }

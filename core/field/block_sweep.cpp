@@ -57,8 +57,10 @@ void BlockSweep::open(const WholeField::Block& block) {
     targeted_[n] = 0;
     for (std::size_t row = 0; row < kRowsAtOnce; ++row) targeted_[n] |= targets_[n * kRowsAtOnce + row];
   }
-  std::ranges::fill(h_, 0), std::ranges::fill(v_, 0);
-  std::ranges::fill(h_part_, 0), std::ranges::fill(v_part_, 0);
+  std::ranges::fill(h_, 0);
+  std::ranges::fill(v_, 0);
+  std::ranges::fill(h_part_, 0);
+  std::ranges::fill(v_part_, 0);
 }
 
 void BlockSweep::open_plane(int dx) {
@@ -101,8 +103,14 @@ void BlockSweep::sweep_plane(int dx) {
 }
 
 void BlockSweep::take_over_sums() {
-  for (std::size_t n = 0; n < h_.size(); ++n) h_[n] += h_part_[n], h_part_[n] = 0;
-  for (std::size_t n = 0; n < v_.size(); ++n) v_[n] += v_part_[n], v_part_[n] = 0;
+  for (std::size_t n = 0; n < h_.size(); ++n) {
+    h_[n] += h_part_[n];
+    h_part_[n] = 0;
+  }
+  for (std::size_t n = 0; n < v_.size(); ++n) {
+    v_[n] += v_part_[n];
+    v_part_[n] = 0;
+  }
 }
 
 void BlockSweep::run(const WholeField::Block& block) {

@@ -33,7 +33,8 @@ class PendingTerms {
     term = {sight_.open_part(view_, c_W), first, second};
     if (term.line) {
       const Vec3 &from = term.line->from, to = from + term.line->delta;
-      low_ = low_.cwiseMin(from.cwiseMin(to)), high_ = high_.cwiseMax(from.cwiseMax(to));
+      low_ = low_.cwiseMin(from.cwiseMin(to));
+      high_ = high_.cwiseMax(from.cwiseMax(to));
     }
     if (count_ == pending_.size()) settle(add);
   }
@@ -43,7 +44,8 @@ class PendingTerms {
     for (const PendingTerm& c : std::span(pending_).first(count_))
       if (all || !c.line || sight_.clear(view_, *c.line)) add(c.first, c.second);
     count_ = 0;
-    low_.setConstant(kFar), high_.setConstant(-kFar);
+    low_.setConstant(kFar);
+    high_.setConstant(-kFar);
   }
 
  private:
@@ -83,7 +85,10 @@ Breakdown ProximityField::at(const Vec3& p_W) const {
     if (nonzero(ground)) pending.take(e.c_W, ground, {}, add_ground);
   });
   pending.settle(add_ground);
-  const auto add_lateral = [&](const Variance& corner, const Variance& wall) { b.corner += corner, b.wall += wall; };
+  const auto add_lateral = [&](const Variance& corner, const Variance& wall) {
+    b.corner += corner;
+    b.wall += wall;
+  };
   lateral_.for_each_near(p_W, {.ball = model_.wall.l_max}, [&](const Element& e) {
     const Variance corner = terms_.corner(e, p_W), wall = terms_.wall(e, p_W);
     if (nonzero(corner) || nonzero(wall)) pending.take(e.c_W, corner, wall, add_lateral);

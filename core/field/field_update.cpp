@@ -13,8 +13,10 @@ map::VoxelBox affected_columns(const map::OccupancyGrid& grid, const Model& mode
   const double lateral = model.wall.l_max / a + 0.5 + 3;
   const int reach = static_cast<int>(std::ceil(std::max(ground, lateral) + 1e-6));
   map::VoxelBox box{changed.low - Index3(reach, reach, 0), changed.high + Index3(reach, reach, 0)};
-  box.low = box.low.cwiseMax(0), box.high = box.high.cwiseMin(grid.size() - Index3::Ones());
-  box.low.z() = 0, box.high.z() = grid.size().z() - 1;
+  box.low = box.low.cwiseMax(0);
+  box.high = box.high.cwiseMin(grid.size() - Index3::Ones());
+  box.low.z() = 0;
+  box.high.z() = grid.size().z() - 1;
   return box;
 }
 

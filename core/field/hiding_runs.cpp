@@ -18,8 +18,10 @@ void HidingRuns::list(const Source& source, const std::uint64_t* inside, std::ui
   for (; some; some &= some - 1) {
     const auto n = static_cast<std::size_t>(std::countr_zero(some));
     const std::uint64_t word = inside[n] & source.below[source.left[n]] & source.above[source.left[n]];
-    element_[count] = source.element, line_[count] = source.line;
-    x_[count] = source.crossings[n].x, y_[count] = source.crossings[n].y;
+    element_[count] = source.element;
+    line_[count] = source.line;
+    x_[count] = source.crossings[n].x;
+    y_[count] = source.crossings[n].y;
     words_[count] = word;
     count += word != 0 ? 1 : 0;
   }
@@ -31,9 +33,13 @@ void HidingRuns::split() {
   for (std::size_t n = 0; n < count_; ++n) {
     reserve(count_ + 2 * kEight);
     const std::uint64_t inside = words_[n], beyond = inside + (inside & -inside);  // the lowest run is carried away
-    low_[n] = std::countr_zero(inside) - kCentre, high_[n] = std::countr_zero(beyond) - 1 - kCentre;
-    element_[count_] = element_[n], line_[count_] = line_[n];
-    x_[count_] = x_[n], y_[count_] = y_[n], words_[count_] = inside & beyond;
+    low_[n] = std::countr_zero(inside) - kCentre;
+    high_[n] = std::countr_zero(beyond) - 1 - kCentre;
+    element_[count_] = element_[n];
+    line_[count_] = line_[n];
+    x_[count_] = x_[n];
+    y_[count_] = y_[n];
+    words_[count_] = inside & beyond;
     count_ += (inside & beyond) != 0 ? 1 : 0;
   }
 }

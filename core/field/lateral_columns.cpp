@@ -108,12 +108,17 @@ std::vector<SightLines::Bundle> LateralColumns::bundle_normals() {
 void LateralColumns::add_arrays() {
   constexpr std::size_t kLanes = 16;
   const std::size_t count = segments_.size() + kLanes;
-  x_.assign(count, 0), low_ = high_ = x_;
-  m_x_.assign(count, 0), m_y_ = m_x_;
+  x_.assign(count, 0);
+  low_ = high_ = x_;
+  m_x_.assign(count, 0);
+  m_y_ = m_x_;
   for (std::size_t n = 0; n < segments_.size(); ++n) {
     const ElementSegment& s = segments_[n];
-    x_[n] = s.x, low_[n] = s.low, high_[n] = s.high;
-    m_x_[n] = static_cast<float>(s.m_x), m_y_[n] = static_cast<float>(s.m_y);
+    x_[n] = s.x;
+    low_[n] = s.low;
+    high_[n] = s.high;
+    m_x_[n] = static_cast<float>(s.m_x);
+    m_y_[n] = static_cast<float>(s.m_y);
   }
 }
 
@@ -129,12 +134,13 @@ void LateralColumns::add_tables() {
     const double beyond = std::max(0.0, dy - 0.5), left = range2_ - beyond * beyond;
     half_width_.push_back(left < 0 ? -1 : std::min(radius_, static_cast<int>(std::sqrt(left) + 0.5)));
   }
-  below_.resize(kLayers), above_.resize(kLayers);
+  below_.resize(kLayers);
+  above_.resize(kLayers);
   for (int n = 0; n < kLayers; ++n)
     for (int part = 0; part < SightLines::kParts; ++part) {
       const double highest = n * (part + 1.0) / SightLines::kParts + 0.5 + kTouch;
       const auto up = static_cast<std::size_t>(n), at = static_cast<std::size_t>(part);
-      below_[up][at] = bits(kCentre - floor_to_int(highest), 63),
+      below_[up][at] = bits(kCentre - floor_to_int(highest), 63);
       above_[up][at] = bits(0, kCentre + floor_to_int(highest));
     }
   corner_l2_ = std::pow((model_.corner.l_max + 1e-9) / a, 2);
@@ -165,7 +171,10 @@ LateralColumns::Reach LateralColumns::bounds_of(double flat2) const noexcept {
 LateralColumns::Reach LateralColumns::exact_reach(double flat2) const noexcept {
   Reach reach = bounds_of(flat2);
   reach.wall_range = std::min(reach.wall_range, reach.range);
-  if (corner_l2_ < flat2 || reach.range < 0) reach.first_up = 0, reach.last_up = -1;
+  if (corner_l2_ < flat2 || reach.range < 0) {
+    reach.first_up = 0;
+    reach.last_up = -1;
+  }
   return reach;
 }
 

@@ -28,8 +28,11 @@ std::size_t find_near(const Standing& segments, std::uint32_t first, std::uint32
   for (std::uint32_t n = first; n < end; n += kLanes) {
     Ints x, low, high;
     Floats m_x, m_y;
-    load(x, segments.x + n), load(low, segments.low + n), load(high, segments.high + n);
-    load(m_x, segments.m_x + n), load(m_y, segments.m_y + n);
+    load(x, segments.x + n);
+    load(low, segments.low + n);
+    load(high, segments.high + n);
+    load(m_x, segments.m_x + n);
+    load(m_y, segments.m_y + n);
     const Floats dx = __builtin_convertvector(x - looking.x, Floats), along = dx * m_x + dy * m_y;
     const Ints near = (along < -0.499F) & (dx * dx + (dy * dy + 0.25F) + along <= looking.range2) &
                       (low <= looking.high) & (high >= looking.low);
@@ -51,10 +54,13 @@ void see(const Seen& seen, std::size_t count, double k2) noexcept {
                                 1.0 / 120,      1.0 / 24,      1.0 / 6,      0.5,         1.0,        1.0};
   for (std::size_t n = 0; n < count; n += kEight) {
     Doubles dx, dy, m_x, m_y;
-    load_ints(dx, seen.dx + n), load_ints(dy, seen.dy + n);
-    load(m_x, seen.m_x + n), load(m_y, seen.m_y + n);
+    load_ints(dx, seen.dx + n);
+    load_ints(dy, seen.dy + n);
+    load(m_x, seen.m_x + n);
+    load(m_y, seen.m_y + n);
     const Doubles along = dx * m_x + dy * m_y, flat2 = dx * dx + dy * dy + 0.25 + along;
-    store(along + 0.5, seen.along + n), store(flat2, seen.flat2 + n);
+    store(along + 0.5, seen.along + n);
+    store(flat2, seen.flat2 + n);
     Doubles x = -k2 * flat2;
     take_most<kAny>(x, Doubles{} - 700.0);
     const Doubles shifted = x * kPerLn2 + kRound, power = shifted - kRound;
@@ -70,13 +76,17 @@ void make_lines(const double* c_x, const double* c_y, const double* range, std::
                 LineFromAbove* lines) noexcept {
   for (std::size_t n = 0; n < count; n += kEight) {
     Doubles x, y, r;
-    load(x, c_x + n), load(y, c_y + n), load(r, range + n);
+    load(x, c_x + n);
+    load(y, c_y + n);
+    load(r, range + n);
     const Doubles flat2 = x * x + y * y;
     Doubles flat = flat2, length = flat2 + r * r;
-    take_root(flat), take_root(length);
+    take_root(flat);
+    take_root(length);
     take_most<kAny>(length, Doubles{} + 2.0);
     Doubles size_x = x, size_y = y;  // a line along an axis: the other coordinate stays a number
-    take_size(size_x), take_size(size_y);
+    take_size(size_x);
+    take_size(size_y);
     const Doubles per_x = size_x < 1e-9 ? Doubles{} + 1e9 : 1 / x, per_y = size_y < 1e-9 ? Doubles{} + 1e9 : 1 / y;
     const Doubles end = 1 - 2 / length;
     for (std::size_t k = 0; k < kEight; ++k) lines[n + k] = {per_x[k], per_y[k], flat[k], end[k]};
@@ -89,9 +99,11 @@ void classify(const Elements& elements, std::size_t count, std::uint64_t targets
   for (std::size_t n = 0; n < count; n += kEight) {
     Words up, down, with_corner, all;
     take_moves(elements.z + n, up, down);
-    load(with_corner, elements.with_corner + n), load(all, elements.all + n);
+    load(with_corner, elements.with_corner + n);
+    load(all, elements.all + n);
     Longs wall_range, range;
-    load_longs(wall_range, elements.wall_range + n), load_longs(range, elements.range + n);
+    load_longs(wall_range, elements.wall_range + n);
+    load_longs(range, elements.range + n);
     const Longs most = Longs{} + kCentre;
     const Words reach = reinterpret_cast<Words>(range < most ? range : most);
     const Words wall = ((one << reinterpret_cast<Words>(wall_range + 1)) - 1) << kCentre;
@@ -104,7 +116,8 @@ void classify(const Elements& elements, std::size_t count, std::uint64_t targets
     Words below = occupied & (centre - 1);
     fill_down(below);
     const Words certain = near & ((above & -above) - 1) & ~below & ((occupied >> kCentre & 1) - 1);
-    store(certain, elements.certain + n), store(near & ~certain, elements.open + n);
+    store(certain, elements.certain + n);
+    store(near & ~certain, elements.open + n);
   }
 }
 
@@ -115,8 +128,10 @@ void decide(const Elements& elements, std::size_t count, const std::uint64_t* hi
   for (std::size_t n = 0; n < count; n += kEight) {
     Words up, down, with_corner, certain, open, behind;
     take_moves(elements.z + n, up, down);
-    load(with_corner, elements.with_corner + n), load(behind, hidden + n);
-    load(certain, elements.certain + n), load(open, elements.open + n);
+    load(with_corner, elements.with_corner + n);
+    load(behind, hidden + n);
+    load(certain, elements.certain + n);
+    load(open, elements.open + n);
     Longs wall_range;
     load_longs(wall_range, elements.wall_range + n);
     const Words seen = certain | (open & ~behind);
@@ -142,10 +157,14 @@ struct LookInside {
       load(word, words + n);
       word = (word << up | word >> down) & band;
       store(word, inside + n);
-      some |= word != 0 ? at : Piece{}, full |= word == band ? at : Piece{};
+      some |= word != 0 ? at : Piece{};
+      full |= word == band ? at : Piece{};
     }
     Inside all{};
-    for (std::size_t n = 0; n < kWords; ++n) all.some |= some[n], all.full |= full[n];
+    for (std::size_t n = 0; n < kWords; ++n) {
+      all.some |= some[n];
+      all.full |= full[n];
+    }
     return all;
   }
 };
@@ -170,14 +189,20 @@ template <std::size_t kPiece>
     Lines line;
     gather(lines, hiding.line + n, line);
     Doubles x, y, low, high;
-    load_ints(x, hiding.x + n), load_ints(y, hiding.y + n);
-    load_ints(low, hiding.low + n), load_ints(high, hiding.high + n);
-    x *= line.per_x, y *= line.per_y;
+    load_ints(x, hiding.x + n);
+    load_ints(y, hiding.y + n);
+    load_ints(low, hiding.low + n);
+    load_ints(high, hiding.high + n);
+    x *= line.per_x;
+    y *= line.per_y;
     Doubles half_x = kHalf * line.per_x, half_y = kHalf * line.per_y;
-    take_size(half_x), take_size(half_y);
+    take_size(half_x);
+    take_size(half_y);
     Doubles in = x - half_x, out = x + half_x;
-    take_most<kPiece>(in, y - half_y), take_least<kPiece>(out, y + half_y);
-    take_most<kPiece>(in, Doubles{}), take_least<kPiece>(out, line.end);
+    take_most<kPiece>(in, y - half_y);
+    take_least<kPiece>(out, y + half_y);
+    take_most<kPiece>(in, Doubles{});
+    take_least<kPiece>(out, line.end);
     const Doubles far = 1 / (1 - in), near = 1 / (1 - out);
     // Heights below the gap have the column in their last 2 voxel edges: a line that is longer than 2 beyond `in`.
     Doubles least = 2 * far;
@@ -189,17 +214,28 @@ template <std::size_t kPiece>
     take_floor<kPiece>(gap);  // minus the gap
     const Doubles bottom = low - kHalf, top = high + kHalf;
     Doubles first, last;
-    choose_less<kPiece>(Doubles{}, bottom, far, near, first), choose_less<kPiece>(top, Doubles{}, far, near, last);
-    first *= -bottom, last *= top;
+    choose_less<kPiece>(Doubles{}, bottom, far, near, first);
+    choose_less<kPiece>(top, Doubles{}, far, near, last);
+    first *= -bottom;
+    last *= top;
     Doubles level = line.flat * end0, next = line.flat * end1;
-    take_floor<kPiece>(first), take_floor<kPiece>(last), take_floor<kPiece>(level), take_floor<kPiece>(next);
+    take_floor<kPiece>(first);
+    take_floor<kPiece>(last);
+    take_floor<kPiece>(level);
+    take_floor<kPiece>(next);
     // Of the first it is minus it.
     Doubles from_level = low, from_next = low + 1, to_level = high, to_next = high - 1, under, over;
-    take_size(from_level), take_size(from_next), take_size(to_level), take_size(to_next);
+    take_size(from_level);
+    take_size(from_next);
+    take_size(to_level);
+    take_size(to_next);
     const Doubles half = Doubles{} + 0.5;
-    choose_less<kPiece>(from_next, half, next, first, under), choose_less<kPiece>(to_next, half, next, last, over);
-    choose_less<kPiece>(from_level, half, level, under, under), choose_less<kPiece>(to_level, half, level, over, over);
-    take_least<kPiece>(first, under), take_least<kPiece>(last, over);
+    choose_less<kPiece>(from_next, half, next, first, under);
+    choose_less<kPiece>(to_next, half, next, last, over);
+    choose_less<kPiece>(from_level, half, level, under, under);
+    choose_less<kPiece>(to_level, half, level, over, over);
+    take_least<kPiece>(first, under);
+    take_least<kPiece>(last, over);
     Longs hidden, spared;
     take_bits<kPiece>(kCentre - first, kCentre + last, hidden);
     take_bits<kPiece>((kCentre + 1) + gap, (kCentre - 1) - gap, spared);
@@ -256,7 +292,10 @@ void add_corner(const CornerTerms& terms, std::uint64_t heights, const float* co
       sum += per_unit * factor;
       store(sum, to.data() + at);
     };
-    add(terms.xx, sums.xx), add(terms.xy, sums.xy), add(terms.yy, sums.yy), add(terms.zz, sums.zz);
+    add(terms.xx, sums.xx);
+    add(terms.xy, sums.xy);
+    add(terms.yy, sums.yy);
+    add(terms.zz, sums.zz);
     heights = z + 8 < 64 ? heights >> (z + 8) << (z + 8) : 0;
   }
 }
@@ -269,9 +308,12 @@ void sum_walls(const Walls& walls, int first, int last, int heights, Four* row, 
     Quad number{};
     for (int n = 0; n < walls.width; ++n) {
       Quad here, change;
-      load(here, row + n), load(change, numbers + n);
-      here += change, number += here;
-      store(here, row + n), store(Quad{}, numbers + n);
+      load(here, row + n);
+      load(change, numbers + n);
+      here += change;
+      number += here;
+      store(here, row + n);
+      store(Quad{}, numbers + n);
       if (z + n < 0 || z + n >= heights) continue;
       Quad sum;
       load(sum, sums + (z + n));

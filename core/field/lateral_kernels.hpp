@@ -103,11 +103,17 @@ void add_corner(const CornerTerms& terms, std::uint64_t heights, const float* co
 struct alignas(32) Four {
   double xx, xy, yy, zz;
   Four& operator+=(const Four& b) noexcept {
-    xx += b.xx, xy += b.xy, yy += b.yy, zz += b.zz;
+    xx += b.xx;
+    xy += b.xy;
+    yy += b.yy;
+    zz += b.zz;
     return *this;
   }
   Four& operator-=(const Four& b) noexcept {
-    xx -= b.xx, xy -= b.xy, yy -= b.yy, zz -= b.zz;
+    xx -= b.xx;
+    xy -= b.xy;
+    yy -= b.yy;
+    zz -= b.zz;
     return *this;
   }
 };

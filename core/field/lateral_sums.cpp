@@ -26,9 +26,12 @@ void LateralSums::add_wall(int from, int to, int first, int beyond, double decay
   const Four number{rounded(tensor.xx), rounded(tensor.xy), rounded(tensor.yy), rounded(tensor.zz)};
   Four* row = walls_.data() + static_cast<std::ptrdiff_t>(from + radius_) * width_;
   Four* end = row + static_cast<std::ptrdiff_t>(to - from + 1) * width_;
-  row[first] += number, row[beyond] -= number;
-  end[first] -= number, end[beyond] += number;
-  first_ = std::min(first_, from), last_ = std::max(last_, to + 1);
+  row[first] += number;
+  row[beyond] -= number;
+  end[first] -= number;
+  end[beyond] += number;
+  first_ = std::min(first_, from);
+  last_ = std::max(last_, to + 1);
 }
 
 void LateralSums::add_wall(int z, std::uint64_t heights, double decay, const Tensor& tensor) noexcept {
@@ -48,11 +51,14 @@ void LateralSums::close(std::uint64_t targets, LateralColumns::Sums& sums) noexc
   for (; targets; targets &= targets - 1) {
     const auto n = static_cast<std::size_t>(std::countr_zero(targets));
     const Four& wall = wall_[n];
-    sums.xx[n] = wall.xx + corner_.xx[n], sums.xy[n] = wall.xy + corner_.xy[n];
-    sums.yy[n] = wall.yy + corner_.yy[n], sums.zz[n] = wall.zz + corner_.zz[n];
+    sums.xx[n] = wall.xx + corner_.xx[n];
+    sums.xy[n] = wall.xy + corner_.xy[n];
+    sums.yy[n] = wall.yy + corner_.yy[n];
+    sums.zz[n] = wall.zz + corner_.zz[n];
   }
   corner_ = {};
-  first_ = std::numeric_limits<int>::max(), last_ = std::numeric_limits<int>::min();
+  first_ = std::numeric_limits<int>::max();
+  last_ = std::numeric_limits<int>::min();
 }
 
 }  // namespace backwash::field

@@ -36,7 +36,9 @@ template <typename Word>
 void LateralSweep<Word>::open(int x, int y, int height, int first_z) {
   const int r = columns_.radius_, rows = height + 2 * r, pitch = columns_.pitch_;
   const Index3& size = columns_.grid_->size();
-  first_x_ = x - r, first_y_ = y - r, first_z_ = first_z;
+  first_x_ = x - r;
+  first_y_ = y - r;
+  first_z_ = first_z;
   window_.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(pitch), 0);
   constexpr int kBits = 8 * sizeof(Word);
   for (int z = std::max(0, first_z - kBelow); z < std::min(size.z(), first_z + kBits - kBelow); ++z)
@@ -52,7 +54,9 @@ void LateralSweep<Word>::open(int x, int y, int height, int first_z) {
 
 template <typename Word>
 const LateralColumns::Sums& LateralSweep<Word>::sum(int x, int y, std::uint64_t targets) {
-  x_ = x, y_ = y, targets_ = targets;
+  x_ = x;
+  y_ = y;
+  targets_ = targets;
   home_ = window_.data() + static_cast<std::ptrdiff_t>(y - first_y_) * columns_.pitch_ + (x - first_x_);
   const int radius = columns_.radius_;
   near_.find(columns_, x, y, first_z_ + lowest(targets) - radius, first_z_ + highest(targets) + radius);
@@ -73,7 +77,11 @@ const LateralColumns::Sums& LateralSweep<Word>::sum(int x, int y, std::uint64_t 
 
 template <typename Word>
 void LateralSweep<Word>::reserve_views(std::size_t most) {
-  views_.resize(most), lines_.resize(most), c_x_.resize(most), c_y_.resize(most), range_.resize(most);
+  views_.resize(most);
+  lines_.resize(most);
+  c_x_.resize(most);
+  c_y_.resize(most);
+  range_.resize(most);
 }
 
 /// What the gates leave of a segment.
@@ -93,17 +101,23 @@ void LateralSweep<Word>::open_view(std::uint32_t near) {
   const std::size_t number = view_count_++;
   View& view = views_[number];
   static_cast<LateralColumns::Reach&>(view) = reach;
-  view.segment = &segment, view.near = near, view.with_corner = with_corner;
-  view.words = static_cast<std::uint32_t>(word_count_ - line.count), view.crossings = line.first;
-  view.crossed = line.count, view.must = line.must;
+  view.segment = &segment;
+  view.near = near;
+  view.with_corner = with_corner;
+  view.words = static_cast<std::uint32_t>(word_count_ - line.count);
+  view.crossings = line.first;
+  view.crossed = line.count;
+  view.must = line.must;
   view.element = static_cast<std::uint32_t>(element_count_);
-  view.from = 0, view.to = -1;
+  view.from = 0;
+  view.to = -1;
   if (segment.low == segment.high)
     add_element(view, low, all);
   else
     add_stack(view, all);
   view.end = static_cast<std::uint32_t>(element_count_);
-  c_x_[number] = near_.dx[near] + 0.5 * segment.m_x, c_y_[number] = near_.dy[near] + 0.5 * segment.m_y;
+  c_x_[number] = near_.dx[near] + 0.5 * segment.m_x;
+  c_y_[number] = near_.dy[near] + 0.5 * segment.m_y;
   range_[number] = reach.range;
 }
 
@@ -151,13 +165,18 @@ void LateralSweep<Word>::add_stack(View& view, const Word& all_layers) {
     const int middle = std::clamp((lowest(targets) + highest(targets)) / 2, from, to) + kLift;
     const int below = highest_of(all & ((Layers{1} << middle) - 1)) - kLift;
     const int above = lowest_of(all >> middle << middle) - kLift;
-    first = std::max(from, below + 1), last = std::min(to, above - 1);
+    first = std::max(from, below + 1);
+    last = std::min(to, above - 1);
     if (lowest(targets) <= below) first = std::max(first, below + 1 + up);
     if (highest(targets) >= above) last = std::min(last, above - 1 - down);
-    if (first > last) first = to + 1, last = to;
+    if (first > last) {
+      first = to + 1;
+      last = to;
+    }
   }
   for (int z = from; z < first; ++z) add_element(view, z, all_layers);
-  view.from = static_cast<std::int16_t>(first), view.to = static_cast<std::int16_t>(last);
+  view.from = static_cast<std::int16_t>(first);
+  view.to = static_cast<std::int16_t>(last);
   for (int z = last + 1; z <= to; ++z) add_element(view, z, all_layers);
 }
 
@@ -167,14 +186,22 @@ void LateralSweep<Word>::add_element(const View& view, int z, const Word& all) {
   const std::size_t n = element_count_++;
   if (z_.size() < n + 2 * kEight) {
     const std::size_t most = 2 * (n + 2 * kEight);
-    view_of_.resize(most), open_elements_.resize(most), z_.resize(most), wall_range_.resize(most), reach_.resize(most);
+    view_of_.resize(most);
+    open_elements_.resize(most);
+    z_.resize(most);
+    wall_range_.resize(most);
+    reach_.resize(most);
     for (auto* words : {&with_corner_, &all_about_, &certain_, &open_, &far_, &hidden_, &wall_, &corner_})
       words->resize(most);
   }
   view_of_[n] = static_cast<std::uint32_t>(view_count_ - 1);
-  z_[n] = z, wall_range_[n] = view.wall_range, reach_[n] = view.range;
-  with_corner_[n] = view.with_corner, all_about_[n] = around(all, z);
-  far_[n] = 0, hidden_[n] = 0;
+  z_[n] = z;
+  wall_range_[n] = view.wall_range;
+  reach_[n] = view.range;
+  with_corner_[n] = view.with_corner;
+  all_about_[n] = around(all, z);
+  far_[n] = 0;
+  hidden_[n] = 0;
   if (view.range <= kCentre) return;
   const std::uint64_t targets =
       targets_ & (bits(z, z + view.wall_range) | (view.with_corner & bits(z - view.range, z + view.range)));
@@ -216,12 +243,14 @@ void LateralSweep<Word>::look_between(std::uint32_t element) {
     const auto found = look_inside(words + first, std::min(kMost, view.crossed - first),
                                    sizeof(Word) == 8 ? kCentre - z : 0, band, inside_.data() + first);
     if (first < view.must && (found.full & bits(0, static_cast<int>(view.must - first) - 1))) {
-      hiding_.cut(before), open_[element] = 0;
+      hiding_.cut(before);
+      open_[element] = 0;
       return;
     }
     const std::uint64_t some = found.some & bits(0, static_cast<int>(view.crossed - first) - 1);
     hiding_.list(source, inside_.data() + first, some);
-    source.crossings += kMost, source.left += kMost;
+    source.crossings += kMost;
+    source.left += kMost;
   }
 }
 

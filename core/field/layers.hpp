@@ -14,7 +14,8 @@ class TwoWords {
   friend constexpr bool operator==(const TwoWords&, const TwoWords&) = default;
   constexpr TwoWords operator~() const noexcept { return {~lower_, ~upper_}; }
   constexpr TwoWords& operator|=(const TwoWords& b) noexcept {
-    lower_ |= b.lower_, upper_ |= b.upper_;
+    lower_ |= b.lower_;
+    upper_ |= b.upper_;
     return *this;
   }
   friend constexpr TwoWords operator&(const TwoWords& a, const TwoWords& b) noexcept {

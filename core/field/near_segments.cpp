@@ -10,8 +10,14 @@ namespace backwash::field {
 
 void NearSegments::reserve(std::size_t most) {
   if (number.size() >= most) return;
-  number.resize(2 * most), dx.resize(2 * most), dy.resize(2 * most), m_x.resize(2 * most), m_y.resize(2 * most);
-  along.resize(2 * most), flat2.resize(2 * most), decay.resize(2 * most);
+  number.resize(2 * most);
+  dx.resize(2 * most);
+  dy.resize(2 * most);
+  m_x.resize(2 * most);
+  m_y.resize(2 * most);
+  along.resize(2 * most);
+  flat2.resize(2 * most);
+  decay.resize(2 * most);
 }
 
 void NearSegments::find(const LateralColumns& columns, int x, int y, int low, int high) {
@@ -30,7 +36,10 @@ void NearSegments::find(const LateralColumns& columns, int x, int y, int low, in
     const std::size_t more = find_near(standing, first, end, looking, number.data() + count);
     for (std::size_t n = count; n < count + more; ++n) {
       const auto& s = columns.segments_[number[n]];
-      dx[n] = s.x - x, dy[n] = looking.dy, m_x[n] = s.m_x, m_y[n] = s.m_y;
+      dx[n] = s.x - x;
+      dy[n] = looking.dy;
+      m_x[n] = s.m_x;
+      m_y[n] = s.m_y;
     }
     count += more;
   }

@@ -51,14 +51,19 @@ bool clear_along(const LineSegment& line, const EmptyRadius& empty_radius, int e
   for (double s = std::max(empty_start - 1, 0) - kReach; s <= end;) {
     const double x = line.from[u] + s * direction;
     const double y = line.from[v] + s * slope_v, z = line.from[w] + s * slope_w;
-    cell[u] = floor_to_int(x), cell[v] = floor_to_int(y), cell[w] = floor_to_int(z);
+    cell[u] = floor_to_int(x);
+    cell[v] = floor_to_int(y);
+    cell[w] = floor_to_int(z);
     if (const int radius = empty_radius(cell); radius > 1) {
       s += radius - 1 - kReach;
       continue;
     }
     double piece = upward ? cell[u] + 1 - x : x - cell[u];
     int u0 = cell[u], u1 = cell[u];
-    if (piece < kReach) piece += 1, (upward ? ++u1 : --u0);  // grazes the slab's end: take it with the next slab
+    if (piece < kReach) {
+      piece += 1;
+      (upward ? ++u1 : --u0);
+    }  // grazes the slab's end: take it with the next slab
     const double y1 = y + piece * slope_v, z1 = z + piece * slope_w;
     const int v0 = floor_to_int(std::min(y, y1) - kReach), v1 = floor_to_int(std::max(y, y1) + kReach);
     const int w0 = floor_to_int(std::min(z, z1) - kReach), w1 = floor_to_int(std::max(z, z1) + kReach);

@@ -66,7 +66,8 @@ class SightLines {
 
 /// Bits low … high of a word; none if low > high or all are outside it.
 inline std::uint64_t bits(int low, int high) noexcept {
-  low = low < 0 ? 0 : low, high = high > 63 ? 63 : high;
+  low = low < 0 ? 0 : low;
+  high = high > 63 ? 63 : high;
   return low > high ? 0 : ~std::uint64_t{0} >> (63 - high + low) << low;
 }
 

@@ -48,7 +48,10 @@ void add_lateral_elements(const OccupancyGrid& grid, const Index3& v, std::vecto
   int best = 0;  // g is a vector of integers: its products with the faces are exact, and so are ties
   std::size_t best_face = 0;
   for (std::size_t f = 0; f < 4; ++f)
-    if (const int along = g.dot(kFaces[f].head<2>()); exposed[f] && along > best) best = along, best_face = f;
+    if (const int along = g.dot(kFaces[f].head<2>()); exposed[f] && along > best) {
+      best = along;
+      best_face = f;
+    }
 
   if (!one_voxel_wall && best > 0) {
     // Without the common divisor, so that normals of one direction are equal in every bit.

@@ -77,8 +77,10 @@ template <std::size_t kPiece>
                                                const Doubles& no, Doubles& chosen) noexcept {
   constexpr std::size_t kCount = sizeof(Doubles) / kPiece;
   std::array<typename Native<kPiece>::Doubles, kCount> less, more, first, second;
-  std::memcpy(less.data(), &a, sizeof a), std::memcpy(more.data(), &b, sizeof b);
-  std::memcpy(first.data(), &yes, sizeof yes), std::memcpy(second.data(), &no, sizeof no);
+  std::memcpy(less.data(), &a, sizeof a);
+  std::memcpy(more.data(), &b, sizeof b);
+  std::memcpy(first.data(), &yes, sizeof yes);
+  std::memcpy(second.data(), &no, sizeof no);
   for (std::size_t n = 0; n < kCount; ++n) first[n] = less[n] < more[n] ? first[n] : second[n];
   std::memcpy(&chosen, first.data(), sizeof chosen);
 }
@@ -108,7 +110,8 @@ template <std::size_t kPiece>
 template <std::size_t kPiece>
 [[gnu::always_inline]] inline void take_bits_to(const Doubles& x, Longs& words) noexcept {
   Doubles count = x + 1.0;
-  take_most<kPiece>(count, Doubles{}), take_least<kPiece>(count, Doubles{} + 64.0);
+  take_most<kPiece>(count, Doubles{});
+  take_least<kPiece>(count, Doubles{} + 64.0);
   const Longs n = reinterpret_cast<Longs>(count + kRound) & 127, half = n >> 1;
   words = (((Longs{} + 1) << half) << (n - half)) - 1;
 }
@@ -116,7 +119,8 @@ template <std::size_t kPiece>
 template <std::size_t kPiece>
 [[gnu::always_inline]] inline void take_bits(const Doubles& low, const Doubles& high, Longs& words) noexcept {
   Longs below;
-  take_bits_to<kPiece>(low - 1.0, below), take_bits_to<kPiece>(high, words);
+  take_bits_to<kPiece>(low - 1.0, below);
+  take_bits_to<kPiece>(high, words);
   words &= ~below;
 }
 [[gnu::always_inline]] inline void take_size(Doubles& x) noexcept {
@@ -133,7 +137,7 @@ template <std::size_t kPiece>
   Longs height, none{};
   load_longs(height, z);
   const Longs above = height - kCentre, below = kCentre - height;
-  up = reinterpret_cast<Words>(below > none ? below : none),
+  up = reinterpret_cast<Words>(below > none ? below : none);
   down = reinterpret_cast<Words>(above > none ? above : none);
 }
 /// All bits below the highest one too.
@@ -160,7 +164,10 @@ struct Lines {
     per_y[n] = __builtin_shufflevector(odd01, odd23, 0, 1, 4, 5);
     end[n] = __builtin_shufflevector(odd01, odd23, 2, 3, 6, 7);
   }
-  load(out.per_x, per_x.data()), load(out.per_y, per_y.data()), load(out.flat, flat.data()), load(out.end, end.data());
+  load(out.per_x, per_x.data());
+  load(out.per_y, per_y.data());
+  load(out.flat, flat.data());
+  load(out.end, end.data());
 }
 
 }  // namespace backwash::field::vectors

@@ -29,7 +29,9 @@ WholeField::WholeField(const map::OccupancyGrid& grid, const Model& model, std::
 void WholeField::add_rows(std::span<const std::size_t> voxels) {
   const Index3& size = grid_->size();
   const std::size_t rows = static_cast<std::size_t>(size.y()) * static_cast<std::size_t>(size.z());
-  occupied_.assign(rows * row_words_, 0), up_ = occupied_, listed_ = occupied_;
+  occupied_.assign(rows * row_words_, 0);
+  up_ = occupied_;
+  listed_ = occupied_;
   const auto set = [&](std::vector<std::uint64_t>& bits, std::size_t row, std::size_t x) {
     bits[row * row_words_ + (x + 64) / 64] |= std::uint64_t{1} << x % 64;
   };
@@ -51,7 +53,9 @@ void WholeField::add_blocks(std::span<const std::size_t> voxels) {
   std::size_t low = nx, high = 0;
   for (const std::size_t n : voxels) {
     const std::size_t x = n % nx;
-    rows[n / nx % ny] = 1, low = std::min(low, x), high = std::max(high, x);
+    rows[n / nx % ny] = 1;
+    low = std::min(low, x);
+    high = std::max(high, x);
   }
   const int first = static_cast<int>(low), end = static_cast<int>(high) + 1;
   const int across = (end - first + 63) / 64, width = (end - first + across - 1) / across;

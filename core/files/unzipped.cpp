@@ -27,8 +27,10 @@ tl::expected<std::string, std::string> unzipped(std::string content, std::size_t
     if (state == Z_STREAM_END) inflateReset(&stream);  // gzip files may follow one another
     const std::size_t given = std::min(content.size() - taken, kPiece), held = plain.size();
     plain.resize(held + kPiece);
-    stream.next_in = reinterpret_cast<Bytef*>(content.data() + taken), stream.avail_in = static_cast<uInt>(given);
-    stream.next_out = reinterpret_cast<Bytef*>(plain.data() + held), stream.avail_out = static_cast<uInt>(kPiece);
+    stream.next_in = reinterpret_cast<Bytef*>(content.data() + taken);
+    stream.avail_in = static_cast<uInt>(given);
+    stream.next_out = reinterpret_cast<Bytef*>(plain.data() + held);
+    stream.avail_out = static_cast<uInt>(kPiece);
     state = inflate(&stream, Z_NO_FLUSH);
     taken += given - stream.avail_in;
     plain.resize(held + kPiece - stream.avail_out);

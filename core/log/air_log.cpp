@@ -107,7 +107,8 @@ std::optional<std::string> ReplayedAir::take(const RawRecord& record) {
     if (!constants) return "is no start of what is learnt of the air";
     air_.emplace(*constants);
   } else if (record.header.kind == RecordKind::air) {
-    next_ = payload<AirRecord>(record), offset_ = record.offset;
+    next_ = payload<AirRecord>(record);
+    offset_ = record.offset;
     if (!next_) return "is too short for the air of a tick";
     if (!air_) return "learns of the air, and no record before it says from what";
   } else if (record.header.kind == RecordKind::air_order) {

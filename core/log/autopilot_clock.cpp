@@ -62,7 +62,10 @@ std::vector<ClockPair> clock_pairs(const RawLog& log) {
     if (!out && record.header.kind != RecordKind::frame_in) continue;
     const auto sync = timesync_of(record.bytes);
     if (!sync) continue;
-    if (out && sync->answered_ns == 0) waits = true, asked_ns = sync->asked_ns;
+    if (out && sync->answered_ns == 0) {
+      waits = true;
+      asked_ns = sync->asked_ns;
+    }
     if (out || sync->answered_ns == 0) continue;
     if (!waits || asked_ns != sync->asked_ns) continue;  // it answers somebody else
     const std::int64_t round_trip = record.header.t_ns - sync->asked_ns;
@@ -88,8 +91,14 @@ ClockLine clock_line(const std::vector<ClockPair>& pairs) {
   const auto y = [&](const ClockPair& p) { return seconds(p.ours_ns - zero.ours_ns - (p.theirs_ns - zero.theirs_ns)); };
   const auto n = static_cast<double>(best.size());
   double mean_x = 0, mean_y = 0, xx = 0, xy = 0;
-  for (const auto& p : best) mean_x += x(p) / n, mean_y += y(p) / n;
-  for (const auto& p : best) xx += (x(p) - mean_x) * (x(p) - mean_x), xy += (x(p) - mean_x) * (y(p) - mean_y);
+  for (const auto& p : best) {
+    mean_x += x(p) / n;
+    mean_y += y(p) / n;
+  }
+  for (const auto& p : best) {
+    xx += (x(p) - mean_x) * (x(p) - mean_x);
+    xy += (x(p) - mean_x) * (y(p) - mean_y);
+  }
   ClockLine line;
   line.pairs = best.size();
   line.rate = x(best.back()) >= kRateFrom && xx > 0 ? xy / xx : 0;

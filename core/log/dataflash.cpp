@@ -108,15 +108,18 @@ class DataflashDecoder {
       const std::size_t size = is_format ? kFormatSize : formats_[type].size;
       if (p[0] != kHead[0] || p[1] != kHead[1] || size < kMessageHeader) {
         if (!damaged) log_.dropouts += 1;
-        damaged = true, at += 1;
+        damaged = true;
+        at += 1;
         continue;
       }
       if (at + size > bytes.size()) break;  // cut short
-      if (is_format)
-        formats_[p[3]] = format_of(p), formats = true;
-      else if (formats_[type].timed)
+      if (is_format) {
+        formats_[p[3]] = format_of(p);
+        formats = true;
+      } else if (formats_[type].timed)
         data(formats_[type], p + kMessageHeader);
-      damaged = false, at += size;
+      damaged = false;
+      at += size;
     }
     if (!formats) return tl::unexpected<std::string>("no format message (FMT); give a .bin file of ArduPilot");
     return std::move(log_);

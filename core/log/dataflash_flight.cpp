@@ -52,8 +52,10 @@ void attitude(const TopicLog& log, TopicLog& out) {
     };
     const Eigen::Quaterniond q = about("Yaw", Eigen::Vector3d::UnitZ()) * about("Pitch", Eigen::Vector3d::UnitY()) *
                                  about("Roll", Eigen::Vector3d::UnitX());
-    topic.columns["q[0]"].push_back(q.w()), topic.columns["q[1]"].push_back(q.x());
-    topic.columns["q[2]"].push_back(q.y()), topic.columns["q[3]"].push_back(q.z());
+    topic.columns["q[0]"].push_back(q.w());
+    topic.columns["q[1]"].push_back(q.x());
+    topic.columns["q[2]"].push_back(q.y());
+    topic.columns["q[3]"].push_back(q.z());
   }
   out.topics.push_back(std::move(topic));
 }

@@ -22,7 +22,8 @@ std::vector<double> frame_times(const std::vector<double>& stamps) {
   double c = 0, s = 0;
   for (const double t : stamps) {
     const double angle = 2 * std::numbers::pi * (t - stamps.front()) / kFrame;
-    c += std::cos(angle), s += std::sin(angle);
+    c += std::cos(angle);
+    s += std::sin(angle);
   }
   const double phase = std::atan2(s, c) / (2 * std::numbers::pi) * kFrame;
   std::vector<double> frames;
@@ -65,7 +66,9 @@ tl::expected<FlightLog, LogError> import_airgarage(const std::string& path) {
   for (std::size_t i = 0; i < t.size(); ++i) {
     if (!motion[i]) continue;
     log.t_s.push_back(t[i]);
-    add(log, "", "_m", p[i]), add(log, "v", "_mps", motion[i]->v), add(log, "a", "_mps2", motion[i]->a);
+    add(log, "", "_m", p[i]);
+    add(log, "v", "_mps", motion[i]->v);
+    add(log, "a", "_mps2", motion[i]->a);
     for (const char* q : {"qw", "qx", "qy", "qz"}) log.columns[q].push_back(raw->column(q)[i]);
     log.columns["stood_z_m"].push_back(stood);
     log.columns["surface_z_m"].push_back(stood - kMarkerHeight);

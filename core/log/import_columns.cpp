@@ -80,8 +80,10 @@ void turn(FlightLog& log, const ColumnMap& map) {
       Eigen::Quaterniond q = attitude(log, row);
       if (map.ned) q = enu_of_ned(q);
       if (map.frd) q = flu_of_frd(q);
-      log.columns["qw"][row] = q.w(), log.columns["qx"][row] = q.x();
-      log.columns["qy"][row] = q.y(), log.columns["qz"][row] = q.z();
+      log.columns["qw"][row] = q.w();
+      log.columns["qx"][row] = q.x();
+      log.columns["qy"][row] = q.y();
+      log.columns["qz"][row] = q.z();
     }
     if (map.frd && has_all(log, kForce)) set(log, kForce, row, flu(at(log, kForce, row)));
   }
@@ -107,8 +109,10 @@ void quaternion_of_angles(FlightLog& log) {
     const Eigen::Quaterniond q = Eigen::AngleAxisd(angle.z(), Vec3::UnitZ()) *
                                  Eigen::AngleAxisd(angle.y(), Vec3::UnitY()) *
                                  Eigen::AngleAxisd(angle.x(), Vec3::UnitX());
-    log.columns["qw"].push_back(q.w()), log.columns["qx"].push_back(q.x());
-    log.columns["qy"].push_back(q.y()), log.columns["qz"].push_back(q.z());
+    log.columns["qw"].push_back(q.w());
+    log.columns["qx"].push_back(q.x());
+    log.columns["qy"].push_back(q.y());
+    log.columns["qz"].push_back(q.z());
   }
   drop(log, kAngles);
 }

@@ -18,7 +18,8 @@ LocalMotion cubic(const std::vector<double>& t, const std::vector<Vec3>& p, std:
   for (std::size_t i = first; i < last; ++i) {
     const double u = (t[i] - at) / kHalfWidth;
     const Eigen::Vector4d basis(1, u, u * u, u * u * u);
-    normal += basis * basis.transpose(), right += basis * p[i].transpose();
+    normal += basis * basis.transpose();
+    right += basis * p[i].transpose();
   }
   const Eigen::Matrix<double, 4, 3> c = normal.ldlt().solve(right);
   return {c.row(1) / kHalfWidth, 2 * c.row(2) / (kHalfWidth * kHalfWidth)};

@@ -77,10 +77,15 @@ struct Match {
 Match match_of(const Vectors& said, int axis, const Vectors& shown, int other) {
   const auto n = static_cast<double>(said.size());
   double mean_said = 0, mean_shown = 0, ss = 0, dd = 0, sd = 0;
-  for (std::size_t i = 0; i < said.size(); ++i) mean_said += said[i][axis] / n, mean_shown += shown[i][other] / n;
+  for (std::size_t i = 0; i < said.size(); ++i) {
+    mean_said += said[i][axis] / n;
+    mean_shown += shown[i][other] / n;
+  }
   for (std::size_t i = 0; i < said.size(); ++i) {
     const double s = said[i][axis] - mean_said, d = shown[i][other] - mean_shown;
-    ss += s * s, dd += d * d, sd += s * d;
+    ss += s * s;
+    dd += d * d;
+    sd += s * d;
   }
   return {other, dd > 0 ? sd / dd : 0, ss > 0 && dd > 0 ? sd / std::sqrt(ss * dd) : 0};
 }
@@ -147,7 +152,10 @@ constexpr std::array kQ{"qw", "qx", "qy", "qz"};
 Both where_known(const std::vector<std::optional<LocalMotion>>& motion, const Vectors& said, bool second) {
   Both both;
   for (std::size_t i = 0; i < said.size(); ++i)
-    if (motion[i]) both.derived.push_back(second ? motion[i]->a : motion[i]->v), both.said.push_back(said[i]);
+    if (motion[i]) {
+      both.derived.push_back(second ? motion[i]->a : motion[i]->v);
+      both.said.push_back(said[i]);
+    }
   return both;
 }
 
@@ -285,7 +293,10 @@ std::vector<std::string> silent_columns(const FlightLog& log) {
   const auto look = [&](std::span<const char* const> names) {
     if (silent(log, names)) all.insert(all.end(), names.begin(), names.end());
   };
-  look(kRpm), look(kMotors), look(std::array{"thrust"}), look(std::array{"battery_v"});
+  look(kRpm);
+  look(kMotors);
+  look(std::array{"thrust"});
+  look(std::array{"battery_v"});
   return all;
 }
 

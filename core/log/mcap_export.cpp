@@ -147,7 +147,10 @@ class Exporter {
 
   void take_tick(const TickRecord& row) {
     const Setpoint command{vec(row.cmd_p), vec(row.cmd_v), vec(row.cmd_a), row.cmd_yaw};
-    if ((row.sent & kSentSetpoint) != 0) say(kSetpoint, ros::pose(now_ns_, command)), place_autopilot(row);
+    if ((row.sent & kSentSetpoint) != 0) {
+      say(kSetpoint, ros::pose(now_ns_, command));
+      place_autopilot(row);
+    }
     if (row.judged != 0) {
       const Vec3 half(row.half_widths[kX], row.half_widths[kY], row.half_widths[kZ]);
       say(kError, ros::vector(now_ns_, (vec(row.p) - vec(row.center)).cwiseQuotient(half)));

@@ -45,7 +45,10 @@ class Walk {
   }
 
   void fail(std::uint64_t at, std::string what) {
-    if (end_.wrong.empty() && !what.empty()) end_.wrong = std::move(what), end_.at = at;
+    if (end_.wrong.empty() && !what.empty()) {
+      end_.wrong = std::move(what);
+      end_.at = at;
+    }
   }
 
   void take(McapOp op, std::string_view content, std::uint64_t at) {

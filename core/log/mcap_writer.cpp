@@ -130,7 +130,10 @@ void McapWriter::put_message_index(Chunk& chunk) {
   for (const auto& [channel, places] : std::exchange(places_, {})) {
     chunk.index_at[channel] = at_;
     Bytes content, entries;
-    for (const Place& place : places) put_little(entries, place.t_ns), put_little(entries, place.offset);
+    for (const Place& place : places) {
+      put_little(entries, place.t_ns);
+      put_little(entries, place.offset);
+    }
     put_little(content, channel);
     put_entries(content, entries);
     put_record(McapOp::message_index, content);
@@ -148,8 +151,10 @@ McapWriter::Bytes McapWriter::statistics() const {
   put_little(content, static_cast<std::uint32_t>(chunks_.size()));
   put_little(content, span_.first_ns);
   put_little(content, span_.last_ns);
-  for (std::size_t n = 0; n < messages_.size(); ++n)
-    put_little(counts, static_cast<std::uint16_t>(n + 1)), put_little(counts, messages_[n]);
+  for (std::size_t n = 0; n < messages_.size(); ++n) {
+    put_little(counts, static_cast<std::uint16_t>(n + 1));
+    put_little(counts, messages_[n]);
+  }
   put_entries(content, counts);
   return content;
 }
@@ -162,7 +167,10 @@ std::uint64_t McapWriter::put_summary() {
     put_little(content, chunk.span.last_ns);
     put_little(content, chunk.at);
     put_little(content, chunk.length);
-    for (const auto& [channel, at] : chunk.index_at) put_little(index_at, channel), put_little(index_at, at);
+    for (const auto& [channel, at] : chunk.index_at) {
+      put_little(index_at, channel);
+      put_little(index_at, at);
+    }
     put_entries(content, index_at);
     put_little(content, chunk.index_length);
     put_text(content, "");

@@ -35,8 +35,10 @@ tl::expected<FlightLog, LogError> flight_of_raw_log(const RawLog& log, const std
     if ((mode != Mode::tracking && mode != Mode::hold) || in->odometry_stamp_ns <= last_stamp) continue;
     last_stamp = in->odometry_stamp_ns;
     flight.t_s.push_back(1e-9 * static_cast<double>(in->odometry_stamp_ns));
-    put(flight, "", "_m", tick->p), put(flight, "v", "_mps", tick->v);
-    put(flight, "cmd_", "_m", tick->cmd_p), put(flight, "cmd_v", "_mps", tick->cmd_v);
+    put(flight, "", "_m", tick->p);
+    put(flight, "v", "_mps", tick->v);
+    put(flight, "cmd_", "_m", tick->cmd_p);
+    put(flight, "cmd_v", "_mps", tick->cmd_v);
     put(flight, "cmd_a", "_mps2", tick->cmd_a);
     for (std::size_t i = 0; i < 4; ++i) flight.columns[std::string("q") + "wxyz"[i]].push_back(in->q[i]);
   }

@@ -13,7 +13,11 @@ namespace {
 
 constexpr std::size_t kCovariance = 36;
 
-void put(CdrWriter& cdr, const Vec3& v) { cdr.number(v.x()), cdr.number(v.y()), cdr.number(v.z()); }
+void put(CdrWriter& cdr, const Vec3& v) {
+  cdr.number(v.x());
+  cdr.number(v.y());
+  cdr.number(v.z());
+}
 
 void put_time(CdrWriter& cdr, std::int64_t stamp_ns) {
   constexpr std::int64_t kSecond = 1'000'000'000;
@@ -54,8 +58,9 @@ void put(CdrWriter& cdr, std::int64_t stamp_ns, const Marker& m) {
   put_pose(cdr, m.center_W, {1, 0, 0, 0});
   put(cdr, m.scale);
   for (const float part : m.color) cdr.number(part);
-  cdr.number(std::int32_t{0}), cdr.number(std::uint32_t{0});  // lifetime: for ever
-  cdr.number(std::uint8_t{0});                                // not locked to its frame
+  cdr.number(std::int32_t{0});
+  cdr.number(std::uint32_t{0});  // lifetime: for ever
+  cdr.number(std::uint8_t{0});   // not locked to its frame
   cdr.count(m.points_W.size());
   for (const Vec3& p : m.points_W) put(cdr, p);
   cdr.count(0);  // colours of points
@@ -140,7 +145,10 @@ Bytes path(std::int64_t stamp_ns, std::span<const Setpoint> commands) {
   CdrWriter cdr;
   put_header(cdr, stamp_ns, kMapFrame);
   cdr.count(commands.size());
-  for (const Setpoint& c : commands) put_header(cdr, stamp_ns, kMapFrame), put_pose(cdr, c);
+  for (const Setpoint& c : commands) {
+    put_header(cdr, stamp_ns, kMapFrame);
+    put_pose(cdr, c);
+  }
   return cdr.bytes();
 }
 
@@ -148,12 +156,17 @@ Bytes markers(std::int64_t stamp_ns, std::span<const Setpoint> commands, const r
   std::vector<Marker> all(2);
   all[0].delete_all = true;
   Marker& line = all[1];
-  line.type = Marker::kLineStrip, line.id = 1, line.scale.x() = kLineWidth, line.color = kLineColor;
+  line.type = Marker::kLineStrip;
+  line.id = 1;
+  line.scale.x() = kLineWidth;
+  line.color = kLineColor;
   for (const Setpoint& c : commands) line.points_W.push_back(c.p_W);
   for (const auto& [low, high] : reach::tube_boxes(tube, kMostBoxes)) {
     Marker box;
     box.id = static_cast<std::int32_t>(all.size());
-    box.center_W = (low + high) / 2, box.scale = high - low, box.color = kTubeColor;
+    box.center_W = (low + high) / 2;
+    box.scale = high - low;
+    box.color = kTubeColor;
     all.push_back(std::move(box));
   }
   return markers_of(stamp_ns, all);
@@ -167,30 +180,40 @@ Bytes scene(std::int64_t stamp_ns, std::span<const Setpoint> commands, const rea
   cdr.count(1);
   put_header(cdr, stamp_ns, kMapFrame);
   cdr.text("plan");
-  cdr.number(std::int32_t{0}), cdr.number(std::uint32_t{0});  // lifetime: until it is replaced
-  cdr.number(kNo);                                            // not locked to its frame
-  cdr.count(0), cdr.count(0);                                 // metadata, arrows
+  cdr.number(std::int32_t{0});
+  cdr.number(std::uint32_t{0});  // lifetime: until it is replaced
+  cdr.number(kNo);               // not locked to its frame
+  cdr.count(0);
+  cdr.count(0);  // metadata, arrows
   cdr.count(boxes.size());
   for (const auto& [low, high] : boxes) {
     put_pose(cdr, (low + high) / 2, {1, 0, 0, 0});
-    put(cdr, high - low), put(cdr, kTubeColor);
+    put(cdr, high - low);
+    put(cdr, kTubeColor);
   }
-  cdr.count(0), cdr.count(0);  // spheres, cylinders
+  cdr.count(0);
+  cdr.count(0);  // spheres, cylinders
   cdr.count(1);
   cdr.number(kLineStrip);
   put_pose(cdr, Vec3::Zero(), {1, 0, 0, 0});
-  cdr.number(kLineWidth), cdr.number(kNo);  // in m, not in pixels
+  cdr.number(kLineWidth);
+  cdr.number(kNo);  // in m, not in pixels
   cdr.count(commands.size());
   for (const Setpoint& c : commands) put(cdr, c.p_W);
   put(cdr, kLineColor);
-  cdr.count(0), cdr.count(0);                // colours of points, indices
-  cdr.count(0), cdr.count(0), cdr.count(0);  // triangles, texts, models
+  cdr.count(0);
+  cdr.count(0);  // colours of points, indices
+  cdr.count(0);
+  cdr.count(0);
+  cdr.count(0);  // triangles, texts, models
   return cdr.bytes();
 }
 
 Bytes voxels(std::int64_t stamp_ns, const map::OccupancyGrid& grid) {
   Marker cubes;
-  cubes.type = Marker::kCubeList, cubes.scale.setConstant(grid.resolution()), cubes.color = {0.55F, 0.55F, 0.6F, 1};
+  cubes.type = Marker::kCubeList;
+  cubes.scale.setConstant(grid.resolution());
+  cubes.color = {0.55F, 0.55F, 0.6F, 1};
   for (std::size_t n = 0; n < grid.cell_count(); ++n)
     if (grid.at(n) == map::Cell::occupied && at_surface(grid, grid.voxel(n)))
       cubes.points_W.push_back(grid.center(grid.voxel(n)));

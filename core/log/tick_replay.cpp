@@ -21,11 +21,17 @@ class TickRows {
   void add(double value) { values_.push_back(value); }
   void add(const Vec3& v) { values_.insert(values_.end(), v.data(), v.data() + 3); }
   void add(const std::vector<Setpoint>& commands) {
-    for (const Setpoint& c : commands) add(c.p_W), add(c.v_W), add(c.a_W), add(c.yaw);
+    for (const Setpoint& c : commands) {
+      add(c.p_W);
+      add(c.v_W);
+      add(c.a_W);
+      add(c.yaw);
+    }
   }
   void add(const reach::ReachTube& tube) {
     for (const reach::TubeStep& s : tube) {
-      add(s.center.p_W), add(s.center.v_W);
+      add(s.center.p_W);
+      add(s.center.v_W);
       for (const auto& h : {s.half_widths, s.half_widths_interval}) values_.insert(values_.end(), h.begin(), h.end());
     }
   }
@@ -71,7 +77,10 @@ class Cursor {
     std::vector<Setpoint> all;
     for (std::size_t i = 0; i < n && good; ++i) {
       Setpoint c;
-      c.p_W = vec(), c.v_W = vec(), c.a_W = vec(), c.yaw = number();
+      c.p_W = vec();
+      c.v_W = vec();
+      c.a_W = vec();
+      c.yaw = number();
       all.push_back(c);
     }
     return all;
@@ -80,7 +89,8 @@ class Cursor {
     reach::ReachTube all;
     for (std::size_t i = 0; i < n && good; ++i) {
       reach::TubeStep s{};
-      s.center.p_W = vec(), s.center.v_W = vec();
+      s.center.p_W = vec();
+      s.center.v_W = vec();
       for (auto* h : {&s.half_widths, &s.half_widths_interval})
         for (double& width : *h) width = number();
       all.push_back(s);
@@ -161,7 +171,10 @@ std::vector<std::uint8_t> encode(const track::AcceptedSegment& s) {
     rows.add(stop.commands);
     rows.add(stop.tube);
   }
-  if (s.worst != 1) rows.add(s.worst), rows.add(s.worst_at_rest);
+  if (s.worst != 1) {
+    rows.add(s.worst);
+    rows.add(s.worst_at_rest);
+  }
   return rows.bytes();
 }
 
@@ -186,7 +199,10 @@ tl::expected<std::unique_ptr<track::AcceptedSegment>, LogError> decode_offer(std
     in.good = in.good && own_sets == own_commands + 1 && stop.branch <= commands;
     s->stops.push_back(std::move(stop));
   }
-  if (!in.done()) s->worst = in.number(), s->worst_at_rest = in.number();
+  if (!in.done()) {
+    s->worst = in.number();
+    s->worst_at_rest = in.number();
+  }
   if (!in.done() || sets != commands + 1 || !(s->worst >= 1) || !(s->worst_at_rest >= 1))
     return bad("is not an offered segment: its sizes disagree");
   return s;

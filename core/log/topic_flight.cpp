@@ -127,8 +127,10 @@ void join_attitude(const TopicLog& topics, const TopicLog::Topic& position, Flig
     const Eigen::Quaterniond q = flu_of_frd(
         enu_of_ned(at ? attitude_at(*attitude, at->first, at->second)
                       : attitude_at(*attitude, static_cast<std::size_t>(std::max<std::ptrdiff_t>(before - 1, 0)))));
-    log.columns["qw"].push_back(q.w()), log.columns["qx"].push_back(q.x());
-    log.columns["qy"].push_back(q.y()), log.columns["qz"].push_back(q.z());
+    log.columns["qw"].push_back(q.w());
+    log.columns["qx"].push_back(q.x());
+    log.columns["qy"].push_back(q.y());
+    log.columns["qz"].push_back(q.z());
   }
 }
 
@@ -173,16 +175,23 @@ FlightLog flight_of(const TopicLog& topics, const TopicLog::Topic& position) {
   for (const double t : position.t_s) log.t_s.push_back(t - position.t_s.front());
   TopicRows rows(position, log);
   // NED → east, north, up: x = east = y_ned, y = north = x_ned, z = −z_ned.
-  rows.join(&position, "y", "x_m", 1), rows.join(&position, "x", "y_m", 1), rows.join(&position, "z", "z_m", -1);
-  rows.join(&position, "vy", "vx_mps", 1), rows.join(&position, "vx", "vy_mps", 1);
+  rows.join(&position, "y", "x_m", 1);
+  rows.join(&position, "x", "y_m", 1);
+  rows.join(&position, "z", "z_m", -1);
+  rows.join(&position, "vy", "vx_mps", 1);
+  rows.join(&position, "vx", "vy_mps", 1);
   rows.join(&position, "vz", "vz_mps", -1);
-  rows.join(&position, "ay", "ax_mps2", 1), rows.join(&position, "ax", "ay_mps2", 1);
+  rows.join(&position, "ay", "ax_mps2", 1);
+  rows.join(&position, "ax", "ay_mps2", 1);
   rows.join(&position, "az", "az_mps2", -1);
   // A trajectory_setpoint that another mode left empty says nothing; what the controller followed stands in the other.
   for (const char* topic : {"trajectory_setpoint", "vehicle_local_position_setpoint"}) {
     const auto* setpoint = topics.find(topic);
-    for (const auto& [x, y, z] : {std::tuple{"position[0]", "position[1]", "position[2]"}, std::tuple{"x", "y", "z"}})
-      rows.join(setpoint, y, "cmd_x_m", 1), rows.join(setpoint, x, "cmd_y_m", 1), rows.join(setpoint, z, "cmd_z_m", -1);
+    for (const auto& [x, y, z] : {std::tuple{"position[0]", "position[1]", "position[2]"}, std::tuple{"x", "y", "z"}}) {
+      rows.join(setpoint, y, "cmd_x_m", 1);
+      rows.join(setpoint, x, "cmd_y_m", 1);
+      rows.join(setpoint, z, "cmd_z_m", -1);
+    }
     keep_whole(log, {"cmd_x_m", "cmd_y_m", "cmd_z_m"});
   }
   const auto* battery = topics.find("battery_status");

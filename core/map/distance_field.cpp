@@ -59,7 +59,10 @@ void DistanceField::update(const OccupancyGrid& grid, const VoxelBox& changed) {
       int first = low.x(), last = high.x();
       while (first <= last && !reached(first)) ++first;
       while (first < last && !reached(last)) --last;
-      if (first <= last) affected.add({first, j, k}), affected.add({last, j, k});
+      if (first <= last) {
+        affected.add({first, j, k});
+        affected.add({last, j, k});
+      }
     }
   if (affected.empty()) return;
   squared_.own(affected);

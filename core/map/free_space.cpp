@@ -15,7 +15,10 @@ Flood flood_free(OccupancyGrid& grid, std::span<const Index3> seeds) {
     const std::size_t n = grid.linear(v);
     if (met[n] || grid.occupied(v)) return;
     met[n] = 1;
-    if (grid.at(n) == Cell::unknown) grid.set(v, Cell::free), ++flood.freed;
+    if (grid.at(n) == Cell::unknown) {
+      grid.set(v, Cell::free);
+      ++flood.freed;
+    }
     next.push_back(v);
   };
   for (const Index3& seed : seeds) meet(seed);
@@ -50,7 +53,8 @@ std::size_t free_by_rays(OccupancyGrid& grid, std::span<const Vec3> points_W, st
   std::size_t freed = 0;
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     if (grid.at(n) != Cell::unknown || seen.grid().at(n) != Cell::free) continue;
-    grid.set(grid.voxel(n), Cell::free), ++freed;
+    grid.set(grid.voxel(n), Cell::free);
+    ++freed;
   }
   return freed;
 }

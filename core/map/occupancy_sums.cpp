@@ -29,7 +29,8 @@ OccupancySums::Cube OccupancySums::cube_of(const OccupancyGrid& grid, const Voxe
     std::ranges::fill(rows, Sum{0});
     for (int j = 0; j < extent.y(); ++j) {
       const Cell* const cells = grid.cells().data() + grid.linear(voxels.low + Index3(0, j, k));
-      below += cube.stride_y, sums += cube.stride_y;
+      below += cube.stride_y;
+      sums += cube.stride_y;
       Sum row = 0;
       for (std::size_t i = 0; i < width; ++i) {
         row = static_cast<Sum>(row + (cells[i] != Cell::free));
@@ -84,7 +85,8 @@ bool OccupancySums::halves_free_in(const Cube& cube, const Index3& low, const In
   Index3 middle = high, after = low;
   int axis = 0;
   (high - low).maxCoeff(&axis);
-  middle[axis] = low[axis] + (high[axis] - low[axis]) / 2, after[axis] = middle[axis] + 1;
+  middle[axis] = low[axis] + (high[axis] - low[axis]) / 2;
+  after[axis] = middle[axis] + 1;
   return free_in(cube, low, middle) && free_in(cube, after, high);
 }
 

@@ -10,11 +10,16 @@ namespace backwash::plan {
 namespace {
 
 Model ground_alone(Model model) {
-  model.base = {0, 0}, model.wall.k1 = {0, 0, 0}, model.corner.lambda = {0, 0, 0};
+  model.base = {0, 0};
+  model.wall.k1 = {0, 0, 0};
+  model.corner.lambda = {0, 0, 0};
   return model;
 }
 Model walls_alone(Model model) {
-  model.base = {0, 0}, model.ground.lambda = {0, 0}, model.ground.k1 = {0, 0}, model.corner.lambda = {0, 0, 0};
+  model.base = {0, 0};
+  model.ground.lambda = {0, 0};
+  model.ground.k1 = {0, 0};
+  model.corner.lambda = {0, 0, 0};
   return model;
 }
 

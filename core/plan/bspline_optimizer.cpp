@@ -59,7 +59,10 @@ double evaluate(const std::vector<double>& y, std::vector<double>& gradient, voi
   ++run.evaluations;
   if (!gradient.empty())
     Eigen::Map<Points>(gradient.data(), q.rows(), 3) = run.scale * run.variables.gradient(value.gradient);
-  if (value.f < run.best_f) run.best_f = value.f, run.best = std::move(q);
+  if (value.f < run.best_f) {
+    run.best_f = value.f;
+    run.best = std::move(q);
+  }
   return run.scale * value.f;
 }
 

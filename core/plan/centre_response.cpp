@@ -22,8 +22,10 @@ CentreResponse::CentreResponse(const Vehicle& vehicle, reach::Loop loop)
   for (std::size_t k = 0; k < kLongestResponse; ++k) {
     const State s = predictor.step(command);
     command = {};
-    horizontal_.position.push_back(s.p_W.x()), horizontal_.velocity.push_back(s.v_W.x());
-    vertical_.position.push_back(s.p_W.z()), vertical_.velocity.push_back(s.v_W.z());
+    horizontal_.position.push_back(s.p_W.x());
+    horizontal_.velocity.push_back(s.v_W.x());
+    vertical_.position.push_back(s.p_W.z());
+    vertical_.velocity.push_back(s.v_W.z());
     const double size = s.p_W.norm() + s.v_W.norm();
     peak = std::max(peak, size);
     if (size > kForgotten * peak) length = k + 1;

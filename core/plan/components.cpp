@@ -22,7 +22,8 @@ class Forest {
     return n;
   }
   void join(std::uint32_t a, std::uint32_t b) noexcept {
-    a = root(a), b = root(b);
+    a = root(a);
+    b = root(b);
     parent_[std::max(a, b)] = std::min(a, b);
   }
   std::size_t size() const noexcept { return parent_.size(); }

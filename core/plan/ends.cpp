@@ -45,7 +45,8 @@ reach::HoverSet set_from_around(const map::OccupancyGrid& grid, const Model& mod
   map::VoxelBox needed = field::affected_columns(grid, model, read);
   const map::VoxelBox near =
       box_about(std::sqrt(3.0) * within + kAround + reach.vehicle.body.radius + reach.vehicle.estimation.position);
-  needed.add(near.low), needed.add(near.high);
+  needed.add(near.low);
+  needed.add(near.high);
   const map::OccupancyGrid part = map::part_of(grid, needed);
   const map::DistanceField distance(part);
   const std::vector<std::size_t> voxels =

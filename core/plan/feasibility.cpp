@@ -70,7 +70,8 @@ Region flood(const World& world, std::size_t seed, std::uint32_t number, std::ve
     open.pop_back();
     const Vec3 p = grid.center(v);
     region.voxels += 1;
-    region.low_W = region.low_W.cwiseMin(p - half), region.high_W = region.high_W.cwiseMax(p + half);
+    region.low_W = region.low_W.cwiseMin(p - half);
+    region.high_W = region.high_W.cwiseMax(p + half);
     if (const auto wider = wider_than(world, v, region.widest_clearance_m)) {
       region.widest_clearance_m = *wider;
       region.widest_W = p;
@@ -189,7 +190,10 @@ std::optional<HoverPair> farthest_pair(const World& world, const Regions& region
         const Index3 v(i, j, k);
         if (regions.of_voxel[grid.linear(v)] != 0u) continue;
         const auto wider = best ? wider_than(world, v, widest) : clearance(world, v);
-        if (wider) widest = *wider, best = grid.center(v);
+        if (wider) {
+          widest = *wider;
+          best = grid.center(v);
+        }
       }
       if (best) candidates.push_back(*best);
     }

@@ -155,7 +155,10 @@ Approach nearest_approach(const World& world, const reach::ReachTube& tube) {
     if (bound >= least) break;
     const double distance =
         reach::swept_prism_distance(world.grid, tube[k].center.p_W, tube[next(k)].center.p_W, half_widths(k), least);
-    if (distance < least) least = distance, where = k;
+    if (distance < least) {
+      least = distance;
+      where = k;
+    }
   }
   return {least - taken, tube[where].center, tube[where].t};
 }

@@ -116,7 +116,8 @@ void add_cost(const World& world, const reach::NetDisturbance& net, std::size_t 
   const bool safe = world.hover.safe(v),
              plain = world.bounds.extension().none();  // plain: the set holds that at its centre
   if (!(safe && plain) && !reach::prism_clear(world.grid, world.sums, p_W, h, taken)) return;
-  ++cost.safe, cost.lost += !safe;
+  ++cost.safe;
+  cost.lost += !safe;
   if (!safe || (free + kStoredRounding - taken >= kHoverClearanceCap && !clearance_at_centre(world, n, h))) return;
   if (!plain) return cost.some.push_back({std::numeric_limits<double>::infinity(), n});
   const auto set = reach::hover_extent(world.reach, world.grid, world.distance, world.bounds, p_W);
@@ -138,7 +139,9 @@ SetCost cost_of_set(const World& world, const Parallel& parallel) {
   std::vector<GivenUp> some;
   std::size_t nothing = 0;
   for (const auto& layer : layers) {
-    cost.safe_at_centre += layer.safe, cost.lost += layer.lost, nothing += layer.nothing;
+    cost.safe_at_centre += layer.safe;
+    cost.lost += layer.lost;
+    nothing += layer.nothing;
     some.insert(some.end(), layer.some.begin(), layer.some.end());
   }
   Quantiles given_up(std::move(some), nothing, [&world, &net](std::size_t n) {
@@ -194,9 +197,12 @@ std::vector<AgainstMargin> set_against_margins(const World& world, const std::ve
     for (std::size_t n = 0; n < result.size(); ++n) {
       auto& sum = result[n];
       const auto& part = layer[n];
-      sum.voxels += part.voxels, sum.unbounded += part.unbounded;
-      sum.ball_inside_set += part.ball_inside_set, sum.set_inside_ball += part.set_inside_ball;
-      sum.only_ball_safe += part.only_ball_safe, sum.only_set_safe += part.only_set_safe;
+      sum.voxels += part.voxels;
+      sum.unbounded += part.unbounded;
+      sum.ball_inside_set += part.ball_inside_set;
+      sum.set_inside_ball += part.set_inside_ball;
+      sum.only_ball_safe += part.only_ball_safe;
+      sum.only_set_safe += part.only_set_safe;
     }
   }
   return result;

@@ -170,7 +170,8 @@ std::vector<Motion> along(const SafeView& space, const State& start, std::span<c
       const auto leg = quickest(at, to, limits, INFINITY);
       if (leg && clear(space, *leg)) {
         motions.insert(motions.end(), leg->begin(), leg->end());
-        reached += step, at = to;
+        reached += step;
+        at = to;
         break;
       }
       if (step == 1) return {};

@@ -17,7 +17,8 @@ ShortenedWay shortened_way(const SafeView& space, const State& start, const Vec3
     const double steps = (goal_W - from_W).cwiseAbs().maxCoeff() / (edge * space.space().resolution());
     const auto most = edge == 1 ? SIZE_MAX : static_cast<std::size_t>(kBlocksPerStep * (steps + kFewSteps));
     const Way way = way_over_blocks(space, from_W, goal_W, edge, most, deadline);
-    result.status = way.status, result.expanded += way.expanded;
+    result.status = way.status;
+    result.expanded += way.expanded;
     if (way.status != Way::Status::found) continue;
     result.motions = along(space, start, way.points, limits);
     if (result.motions.empty()) continue;

@@ -51,7 +51,11 @@ PerDirection support_weights(const Vec3& n) {
 PerDirection norm_weights(const Vec3& h) {
   PerDirection k{};
   const double norm = h.norm();
-  if (norm > 0) k[kX] = h.x() / norm, k[kY] = h.y() / norm, k[kZ] = h.z() / norm;
+  if (norm > 0) {
+    k[kX] = h.x() / norm;
+    k[kY] = h.y() / norm;
+    k[kZ] = h.z() / norm;
+  }
   return k;
 }
 

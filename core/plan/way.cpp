@@ -146,7 +146,8 @@ Way way_over_blocks(const SafeView& space, const Vec3& from_W, const Vec3& to_W,
     for (const Index3& b : both[turn].chain()) way.points.push_back(blocks.centre(b));
     if (turn == 1) std::ranges::reverse(way.points);
     if (way.points.size() == 1) way.points.push_back(to_W);
-    way.points.front() = from_W, way.points.back() = to_W;
+    way.points.front() = from_W;
+    way.points.back() = to_W;
     return way;
   }
   return way;

@@ -227,7 +227,8 @@ std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid g
   const auto add_beside = [&](double metres) {
     const int by = static_cast<int>(std::ceil(metres / grid.resolution())) + 1;
     const map::VoxelBox beside = grown(changed, {by, by, grid.size().z()}, grid.size());
-    columns.add(beside.low), columns.add(beside.high);
+    columns.add(beside.low);
+    columns.add(beside.high);
   };
   add_beside(vehicle.body.radius);  // a wide body's centre gets places, or loses them, beyond the field's range
   reach::BoundField bounds = old.bounds;

@@ -10,7 +10,10 @@ AxisStep axis_step(const AxisLoop& axis, bool closed, double h) {
   const bool lag = axis.attitude_lag > 0;
   Eigen::Matrix<double, 1, 7> acting = Eigen::Matrix<double, 1, 7>::Zero();  // what the acceleration follows
   acting(3) = 1;
-  if (closed) acting(0) = -axis.kp, acting(1) = -axis.kd;
+  if (closed) {
+    acting(0) = -axis.kp;
+    acting(1) = -axis.kd;
+  }
 
   Mat7 M = Mat7::Zero();  // (p, v, a, u, u̇, ü, u⃛)
   M(0, 1) = 1;

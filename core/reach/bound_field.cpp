@@ -75,8 +75,10 @@ void BoundField::update_pushes() {
   map::for_each_voxel(map::all_of(tiles_.size()), [&](const Index3& v) {
     if (!stored(v)) return;
     const Air air = extension_.at(v);
-    least_push_ = least_push_.cwiseMin(air.push_W), largest_push_ = largest_push_.cwiseMax(air.push_W);
-    unknown_level_ = std::max(unknown_level_, air.level), unknown_vertical_ = std::max(unknown_vertical_, air.vertical);
+    least_push_ = least_push_.cwiseMin(air.push_W);
+    largest_push_ = largest_push_.cwiseMax(air.push_W);
+    unknown_level_ = std::max(unknown_level_, air.level);
+    unknown_vertical_ = std::max(unknown_vertical_, air.vertical);
   });
 }
 
@@ -89,12 +91,15 @@ FieldExtremes BoundField::extremes(double v_max) const noexcept {
   double ln_variance = 0;
   for (int corner = 0; corner < 27; ++corner) {
     const Air air = extension_.moving(v_max * Vec3(corner % 3 - 1, corner / 3 % 3 - 1, corner / 9 - 1));
-    least = least.cwiseMin(air.push_W), most = most.cwiseMax(air.push_W);
-    found.level = std::max(found.level, air.level), found.vertical = std::max(found.vertical, air.vertical);
+    least = least.cwiseMin(air.push_W);
+    most = most.cwiseMax(air.push_W);
+    found.level = std::max(found.level, air.level);
+    found.vertical = std::max(found.vertical, air.vertical);
     ln_variance = std::max(ln_variance, air.ln_variance);
   }
   found.push_range = most - least + largest_push_ - least_push_;
-  found.level += model_.mean_horizontal + unknown_level_, found.vertical += model_.mean_vertical + unknown_vertical_;
+  found.level += model_.mean_horizontal + unknown_level_;
+  found.vertical += model_.mean_vertical + unknown_vertical_;
   found.gusts = largest();
   for (std::size_t d = 0; d < kDirections; ++d) {
     const double mean = d == kZ ? model_.mean_vertical : model_.mean_horizontal;

@@ -110,8 +110,10 @@ void BoundTiles::update(const map::VoxelBox& changed, std::span<const std::size_
   std::vector<std::shared_ptr<Tile>> fresh(met.size());
   std::vector<Tile*> of_tile(tiles_.count(), nullptr);
   parallel(met.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      fresh[n] = std::make_shared<Tile>(renumbered(met[n], changed, marks)), of_tile[met[n]] = fresh[n].get();
+    for (std::size_t n = begin; n < end; ++n) {
+      fresh[n] = std::make_shared<Tile>(renumbered(met[n], changed, marks));
+      of_tile[met[n]] = fresh[n].get();
+    }
   });
   fill([&](std::size_t n, const BoundCodes& codes) {
     const Index3 v = map::voxel(size(), n);

@@ -51,7 +51,9 @@ CentrePredictor::CentrePredictor(const Vehicle& vehicle, Loop loop, const State&
 }
 
 void CentrePredictor::begin(const State& start, const Vec3& a_W, const Setpoint& previous) noexcept {
-  state_ = start, a_W_ = a_W, push_W_.setZero();
+  state_ = start;
+  a_W_ = a_W;
+  push_W_.setZero();
   x_.row(0) = start.p_W;
   x_.row(1) = start.v_W;
   x_.row(2) = a_W;

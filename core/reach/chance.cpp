@@ -197,7 +197,10 @@ ChanceTube chance_tube_over_field(const Reachability& reach, const State& start,
       grown = false;
       for (std::size_t d = 0; d < kDirections; ++d) {
         const double scale = std::max(0.0, (found.w[d] - mean_push[d]) / model.kappa);
-        if (scale > s[d]) s[d] = scale, grown = true;
+        if (scale > s[d]) {
+          s[d] = scale;
+          grown = true;
+        }
       }
     }
     return s;

@@ -18,7 +18,8 @@ using MatrixAll = Eigen::Matrix<double, kAll, kAll>;
 MatrixAll generator(const AxisLoop& axis, double tau_w) {
   enum { p, v, a, z1, z2, xi };
   Eigen::Matrix<double, 1, kAll> u = Eigen::Matrix<double, 1, kAll>::Zero();
-  u[p] = -axis.kp, u[v] = -axis.kd;
+  u[p] = -axis.kp;
+  u[v] = -axis.kd;
   Eigen::Matrix<double, 1, kAll> acting = u;
   MatrixAll A = MatrixAll::Zero();
   A(p, v) = 1;

@@ -151,7 +151,9 @@ std::optional<Remainder> contraction(const Grid& grid, const std::array<Rollout,
   }
   if (!lag) A.row(2).setZero();
   constexpr double kQuadrature = 1.01;  // covers the trapezoid rule and maxima taken at ends
-  A *= kQuadrature, y *= kQuadrature, top *= kQuadrature;
+  A *= kQuadrature;
+  y *= kQuadrature;
+  top *= kQuadrature;
   if (((y * A).array() > y.array() / 2).any()) return std::nullopt;
   // The same matrix carries the supremum: with peak·2y ≥ top, later windows stay below it.
   double peak = 0;

@@ -52,8 +52,15 @@ void bound_chord_excess(AxisResponse& response) {
   double least = std::numeric_limits<double>::infinity();
   const auto try_decay = [&](double rho) {
     double A = 0, power = 1;
-    for (const double c : excess) A = std::max(A, c / power), power *= rho;
-    if (A / (1 - rho) < least) least = A / (1 - rho), response.chord_excess = A, response.chord_decay = rho;
+    for (const double c : excess) {
+      A = std::max(A, c / power);
+      power *= rho;
+    }
+    if (A / (1 - rho) < least) {
+      least = A / (1 - rho);
+      response.chord_excess = A;
+      response.chord_decay = rho;
+    }
   };
   for (double rho = 0.5; rho < 0.9995; rho += 0.0005) try_decay(rho);
   // A loop that hardly damps remembers for minutes.

@@ -50,7 +50,10 @@ class ChargedAxis {
     x_ = move_.E * x_ +
          move_.F * Eigen::Vector4d(command + late + held_, command_rate + (late_after - late) / h_ + rate * seen, 0, 0);
     t_ += h_;
-    if (delay_ > 0) newest_ = oldest, fed_back_[newest_] = feedback();
+    if (delay_ > 0) {
+      newest_ = oldest;
+      fed_back_[newest_] = feedback();
+    }
     const double seen_after = command + command_rate * h_ + (delay_ > 0 ? late_after : feedback());
     held_ += h_ * rate * (seen + seen_after) / 2;
   }
@@ -104,7 +107,8 @@ IntegratorResponse integrator_response(const AxisLoop& axis) {
   if (counted.feedback_delay > 0) counted.feedback_delay = std::max(counted.feedback_delay, kMinFeedbackDelay);
   run_until_settled(ChargedAxis(counted, Start::disturbance), axis, [&](double held, double t, double h) {
     const auto bin = static_cast<std::size_t>(t / kControlPeriod);
-    response.kernel.resize(bin + 1), response.opposite.resize(bin + 1);
+    response.kernel.resize(bin + 1);
+    response.opposite.resize(bin + 1);
     response.kernel[bin] += kHeldMargin * h * std::abs(held);
     response.opposite[bin] += kHeldMargin * h * std::max(0.0, held);  // c = −held
   });
@@ -120,7 +124,8 @@ IntegratorResponse integrator_response(const AxisLoop& axis) {
                       [&](double held, double, double) { peak = std::max(peak, kHeldMargin * std::abs(held)); });
     return peak;
   };
-  response.from_position = peak_after(Start::position), response.from_velocity = peak_after(Start::velocity);
+  response.from_position = peak_after(Start::position);
+  response.from_velocity = peak_after(Start::velocity);
   return response;
 }
 
@@ -136,8 +141,10 @@ std::pair<double, double> held_of_gusts(const IntegratorResponse& response, doub
     shaped = rho * shaped + std::sqrt(2 / tau_w) * charge;
     variance += kControlPeriod * std::max(before * before, shaped * shaped);
   };
-  for (std::size_t j = 0; j < response.kernel.size(); ++j, age *= rho)
-    spread(response.kernel[j]), covariance += age * response.opposite[j];
+  for (std::size_t j = 0; j < response.kernel.size(); ++j, age *= rho) {
+    spread(response.kernel[j]);
+    covariance += age * response.opposite[j];
+  }
   while (shaped * shaped > 1e-6 * variance) spread(0);
   return {variance, covariance};
 }

@@ -27,7 +27,10 @@ std::vector<double> shares(const AxisResponse& axis) {
   std::vector<double> share(axis.G.size());
   double most = 0, excess = axis.chord_excess;
   for (std::size_t n = share.size(); n-- > 0;) share[n] = most = std::max(most, axis.G[n]);
-  for (double& s : share) s += excess, excess *= axis.chord_decay;
+  for (double& s : share) {
+    s += excess;
+    excess *= axis.chord_decay;
+  }
   return share;
 }
 

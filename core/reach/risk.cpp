@@ -62,7 +62,8 @@ class ErrorAlongTube {
     C(0, 1) = C(1, 0) = (variance[kXyPlus] - variance[kXyMinus]) / 2;
     // The bounds of a step may be those of several places: no direction has less than its own.
     const double more = (variance[kXyPlus] + variance[kXyMinus] - variance[kX] - variance[kY]) / 2;
-    C(0, 0) += std::max(0.0, more), C(1, 1) += std::max(0.0, more);
+    C(0, 0) += std::max(0.0, more);
+    C(1, 1) += std::max(0.0, more);
     return {C, turn_rate, steady(reach_.horizontal, model_.mean_horizontal),
             steady(reach_.vertical, model_.mean_vertical)};
   }
@@ -126,7 +127,11 @@ class Surroundings {
         const HalfSpace h = now.beyond(n, now.middle_W + q, taken_);
         // Not by what the motion takes off: an edge ahead would come before the wall that holds it.
         const double level = HalfSpace{n, h.at_W, h.u + std::abs(n.dot(now.half)), h.sigma}.level();
-        if (level < least || (level == least && distance < offset)) least = level, nearest = h, offset = distance;
+        if (level < least || (level == least && distance < offset)) {
+          least = level;
+          nearest = h;
+          offset = distance;
+        }
       }
       if (!(least <= kFarthest)) break;
       found_.push_back(nearest);
@@ -143,7 +148,8 @@ class Surroundings {
     constexpr double kAhead = 0.3;  // m
     if ((low_W.array() >= low_W_.array()).all() && (high_W.array() <= high_W_.array()).all()) return;
     gathered_.clear();
-    low_W_ = low_W - Vec3::Constant(kAhead), high_W_ = high_W + Vec3::Constant(kAhead);
+    low_W_ = low_W - Vec3::Constant(kAhead);
+    high_W_ = high_W + Vec3::Constant(kAhead);
     const Index3 low = grid_.index(low_W_), high = grid_.index(high_W_);
     for (int k = low.z(); k <= high.z(); ++k)
       for (int j = low.y(); j <= high.y(); ++j)
@@ -246,7 +252,10 @@ Risk risk_of_touching(const Reachability& reach, const map::OccupancyGrid& grid,
       const double turned = std::hypot(kControlPeriod * spread.turn_rate, turn(h, earlier, spread));
       turning += turned / (2 * std::numbers::pi) * std::exp(-level * level / 2);
       spent[k] += std::max(0.0, h.outside() - was);
-      if (level < least) least = level, worst[k] = h;
+      if (level < least) {
+        least = level;
+        worst[k] = h;
+      }
     }
     earlier = std::move(found);
     before = now;

@@ -41,8 +41,10 @@ SampledLoop::SampledLoop(const AxisLoop& loop) : axis(loop) {
   RowVectorXd input = RowVectorXd::Zero(n), measured = RowVectorXd::Zero(n);
   if (delay > 0)
     input(n - 1) = 1;
-  else
-    input(0) = -axis.kp, input(1) = -axis.kd;
+  else {
+    input(0) = -axis.kp;
+    input(1) = -axis.kd;
+  }
   const auto states_at = [&](double t) {  // rows p, v, a from z(k)
     const AxisStep step = axis_step(axis, false, t);
     MatrixXd rows = MatrixXd::Zero(3, n);

@@ -83,7 +83,11 @@ std::array<double, 4> horizontal(const DisturbanceBound& b) noexcept {
 
 PerDirection together(const std::array<double, 4>& h, const std::array<double, 1>& v) noexcept {
   PerDirection all;
-  all[kX] = h[0], all[kY] = h[1], all[kXyPlus] = h[2], all[kXyMinus] = h[3], all[kZ] = v[0];
+  all[kX] = h[0];
+  all[kY] = h[1];
+  all[kXyPlus] = h[2];
+  all[kXyMinus] = h[3];
+  all[kZ] = v[0];
   return all;
 }
 

@@ -23,7 +23,8 @@ FieldView field_view(const map::OccupancyGrid& grid, std::span<const Vec3> path_
   Vec3 low = path_W.front(), high = low;
   double height = 0;
   for (const Vec3& p : path_W) {
-    low = low.cwiseMin(p), high = high.cwiseMax(p);
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
     height += p.z() / static_cast<double>(path_W.size());
   }
   const Vec3 around = Vec3::Constant(2);
@@ -43,7 +44,10 @@ FieldBox field_box(const plan::World& world, const FieldView& view, std::size_t 
     return static_cast<std::size_t>(reached(all.x(), box.stride.x())) *
            static_cast<std::size_t>(reached(all.y(), box.stride.y()));
   };
-  while (of_a_layer() > most) ++box.stride.x(), ++box.stride.y();
+  while (of_a_layer() > most) {
+    ++box.stride.x();
+    ++box.stride.y();
+  }
   const std::size_t layers = std::max<std::size_t>(1, most / of_a_layer());
   const auto kept = [&] {
     return (view.layer - low.z()) / box.stride.z() + (high.z() - view.layer) / box.stride.z() + 1;

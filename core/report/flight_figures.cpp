@@ -48,7 +48,8 @@ Figure map_figure(const sim::Flight& flight, const plan::World& world) {
     const auto& h = step.half_widths_interval;
     sets.push_back({step.center.p_W, h});
     const Vec3 extent = Vec3(h[kX], h[kY], h[kZ]) + Vec3::Constant(reserve);
-    low = low.cwiseMin(step.center.p_W - extent), high = high.cwiseMax(step.center.p_W + extent);
+    low = low.cwiseMin(step.center.p_W - extent);
+    high = high.cwiseMax(step.center.p_W + extent);
   }
   const auto& grid = world.grid;
   const Vec3 around(2, 2, 0);

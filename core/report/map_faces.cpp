@@ -15,7 +15,8 @@ class PlaneMerger {
  public:
   PlaneMerger(int side, const Index3& low, const Index3& high)
       : side_(side), axis_(side / 2), u_(axis_ == 0 ? 1 : 0), v_(axis_ == 2 ? 1 : 2), low_(low), high_(high) {
-    width_ = high_[u_] - low_[u_] + 1, height_ = high_[v_] - low_[v_] + 1;
+    width_ = high_[u_] - low_[u_] + 1;
+    height_ = high_[v_] - low_[v_] + 1;
   }
 
   void merge(const map::OccupancyGrid& grid, int layer, std::vector<Face>& faces) {
@@ -35,7 +36,9 @@ class PlaneMerger {
     for (int j = 0; j < height_; ++j)
       for (int i = 0; i < width_; ++i) {
         Index3 voxel;
-        voxel[axis_] = layer, voxel[u_] = low_[u_] + i, voxel[v_] = low_[v_] + j;
+        voxel[axis_] = layer;
+        voxel[u_] = low_[u_] + i;
+        voxel[v_] = low_[v_] + j;
         if (!grid.occupied(voxel)) continue;
         voxel[axis_] += side_ % 2 == 1 ? 1 : -1;
         at(i, j) = grid.free(voxel) ? 1 : 0;
@@ -94,7 +97,10 @@ void keep_nearest(MapFaces& map, std::span<const Vec3> path_W, std::size_t most)
 
 MapFaces map_faces(const map::OccupancyGrid& grid, std::span<const Vec3> path_W, std::size_t most, double around_m) {
   Vec3 low = path_W.front(), high = low;
-  for (const Vec3& p : path_W) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  for (const Vec3& p : path_W) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
   const Vec3 around = Vec3::Constant(around_m);
   const Index3 last = grid.size() - Index3::Ones();
   const Index3 from = grid.index(low - around).cwiseMax(Index3::Zero()).cwiseMin(last),

@@ -31,7 +31,10 @@ class Framer {
   }
 
   void take(std::string_view tag) {
-    if (tag == "<h2>" || tag == "<h3>") heading_ = true, name_.clear();
+    if (tag == "<h2>" || tag == "<h3>") {
+      heading_ = true;
+      name_.clear();
+    }
     if (tag == "</h2>" || tag == "</h3>") heading_ = false;
     if (tag == "<thead>" || tag == "</thead>") head_ = tag == "<thead>";
     if (tag.starts_with("<table"))

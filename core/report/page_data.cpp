@@ -105,8 +105,10 @@ std::string to_json(const Scene& s) {
 /// Codes as two bytes each, the lower one first.
 std::string to_json(const FieldBox& box) {
   std::string bytes;
-  for (const reach::BoundCode code : box.codes)
-    bytes += static_cast<char>(code & 0xff), bytes += static_cast<char>(code >> 8);
+  for (const reach::BoundCode code : box.codes) {
+    bytes += static_cast<char>(code & 0xff);
+    bytes += static_cast<char>(code >> 8);
+  }
   const auto stop = [](const PaletteStop& s) { return array({json_number(s.share), script_quoted(s.colour)}); };
   return object({{"first", json_point(box.first_W)},
                  {"side", json_number(box.side_m)},

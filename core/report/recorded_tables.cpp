@@ -104,7 +104,8 @@ Figure rough_places(const DataTable& table, const map::OccupancyGrid& grid) {
   script << "$way << EOD\n";
   for (const auto& row : table.rows) {
     const Vec3 p(row[1], row[2], row[3]);
-    low = low.cwiseMin(p), high = high.cwiseMax(p);
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
     const auto at = std::ranges::find(table.columns, column("factor", static_cast<std::size_t>(row[4])));
     script << p.x() << ' ' << p.y() << ' ' << table.rows.back()[static_cast<std::size_t>(at - table.columns.begin())]
            << '\n';

@@ -52,8 +52,14 @@ std::string timeline_html(const Timeline& timeline) {
   std::string html =
       "<section id=\"timeline\"><h2>Timeline</h2>\n<p>Above the modes; below them commands, map and VIO. ";
   double from = 0, until = 0;
-  for (const auto& m : timeline.modes) from = std::min(from, m.from_s), until = std::max(until, m.until_s);
-  for (const auto& e : timeline.events) from = std::min(from, e.t_s), until = std::max(until, e.t_s);
+  for (const auto& m : timeline.modes) {
+    from = std::min(from, m.from_s);
+    until = std::max(until, m.until_s);
+  }
+  for (const auto& e : timeline.events) {
+    from = std::min(from, e.t_s);
+    until = std::max(until, e.t_s);
+  }
   html += "From " + to_text(from, 2) + " s to " + to_text(until, 2) + " s.</p>\n" + lanes(timeline, from, until) +
           "<table class=\"wide\">\n<thead><tr><th>time, s</th><th>kind</th><th>what happened</th></tr></thead>\n";
   for (const auto& e : timeline.events) {

@@ -109,7 +109,9 @@ AirflowTruth::Flow AirflowTruth::flow(const Vec3& p_W) const {
   flow.mean.z() = kFloorLift * floor.lift;
   if (const auto up = cast_ray(*grid_, p_W, Vec3::UnitZ(), kUpRange)) {
     const double ceiling = falling(*up, kCeilingLength, 3);
-    flow.xx += kCeiling * ceiling, flow.yy += kCeiling * ceiling, flow.zz += kCeiling * ceiling;
+    flow.xx += kCeiling * ceiling;
+    flow.yy += kCeiling * ceiling;
+    flow.zz += kCeiling * ceiling;
     flow.mean.z() += kCeilingPull * ceiling;
   }
   return flow;

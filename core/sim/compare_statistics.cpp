@@ -95,7 +95,10 @@ Interval ratio_of_totals(std::span<const double> a, std::span<const double> b, s
   assert(a.size() == b.size() && !a.empty());
   return bootstrap(a.size(), seed, [&](const std::vector<std::size_t>& indices) {
     double over = 0, under = 0;
-    for (const std::size_t i : indices) over += a[i], under += b[i];
+    for (const std::size_t i : indices) {
+      over += a[i];
+      under += b[i];
+    }
     return over / under;
   });
 }

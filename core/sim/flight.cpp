@@ -63,8 +63,10 @@ std::string obstacle_to_take_off(const reach::ReachTube& tube, double clearance)
 FlightPiece fly_piece(ClosedLoop& loop, const plan::World& world, track::AcceptedSegment accepted, double t_start,
                       double z_safe, std::size_t hover_from, int hover_number) {
   FlightPiece piece{std::move(accepted), {}, {}, {}};
-  if (const auto& stated = world.bounds.model().stated)
-    piece.accepted.worst = stated->worst, piece.accepted.worst_at_rest = stated->worst / stated->at_rest;
+  if (const auto& stated = world.bounds.model().stated) {
+    piece.accepted.worst = stated->worst;
+    piece.accepted.worst_at_rest = stated->worst / stated->at_rest;
+  }
   track::Tracker tracker(piece.accepted.commands.front(), world.reach.vehicle);
   tracker.accept(piece.accepted, piece.accepted.tube.front().center);  // its tube was propagated from the state of now
   for (std::size_t k = 0; k < piece.accepted.tube.size(); ++k) {

@@ -38,7 +38,8 @@ Variance ModelField::sigma(const Vec3& p_W) {
   map::for_corners(q, [&](const Index3& v, const Vec3& shares) {
     const double share = shares.prod();
     if (!(share > 1e-9) || grid_->occupied(grid_->index(kLattice * v.cast<double>()))) return;
-    sum += share * at(v), weight += share;
+    sum += share * at(v);
+    weight += share;
   });
   return weight > 0 ? 1 / weight * sum : field_.at(p_W).sigma();
 }

@@ -42,7 +42,10 @@ Sensors::Sensors(const Vehicle& vehicle, std::span<const SimulationTerm> terms, 
       if (term.is(Kind::rotor_needs)) needs_[i] += term.value[i];
       if (term.is(Kind::rotor_reading)) reads_[i] += term.value[i];
       if (term.is(Kind::rotor_dropout)) missing_[i] += term.value[i];
-      if (term.is(Kind::sensor_lines)) lines_[i] = std::hypot(lines_[i], term.value[i]), built_[i] = kBuilt[i];
+      if (term.is(Kind::sensor_lines)) {
+        lines_[i] = std::hypot(lines_[i], term.value[i]);
+        built_[i] = kBuilt[i];
+      }
     }
     if (term.is(Kind::sensor_lines)) floor_ = std::max(floor_, term.value[4]);
   }

@@ -73,7 +73,9 @@ Setpoint at_time(const LoggedFlight& flight, std::size_t& heard, double t) {
   if (heard + 1 >= ts.size() || ts[heard + 1] - ts[heard] > 0.1 || t < ts[heard]) return c;
   const double share = (t - ts[heard]) / (ts[heard + 1] - ts[heard]);
   const Setpoint& next = flight.commands[heard + 1];
-  c.p_W += share * (next.p_W - c.p_W), c.v_W += share * (next.v_W - c.v_W), c.a_W += share * (next.a_W - c.a_W);
+  c.p_W += share * (next.p_W - c.p_W);
+  c.v_W += share * (next.v_W - c.v_W);
+  c.a_W += share * (next.a_W - c.a_W);
   return c;
 }
 

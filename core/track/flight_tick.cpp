@@ -145,8 +145,10 @@ void FlightTick::watch_floor(const TickInput& in, const TickOutput& out) noexcep
   const bool off = floor_ && std::abs(z - *floor_) > apart(in);
   if (in.autopilot.armed && off) left_floor_ = true;
   // In other hands it may have come back to where it stood. Its word is taken again, but no more to stop its motors.
-  if (left_floor_ && !was_commanding_ && !off && in.autopilot.landed.value_or(false))
-    left_floor_ = false, floor_.reset();
+  if (left_floor_ && !was_commanding_ && !off && in.autopilot.landed.value_or(false)) {
+    left_floor_ = false;
+    floor_.reset();
+  }
 }
 
 // What the autopilot says of the ground is believed where the height does not contradict it; motors are stopped where

@@ -41,7 +41,8 @@ double AutopilotFacts::pose_age(std::int64_t now_ns) const noexcept {
 void FlightTick::take_closure(std::optional<OdometrySample>& sample) noexcept {
   closure_refused_now_ = false;
   const double faded = was_commanding_ ? 1 - kControlPeriod / kClosureFades : 0;
-  closed_m_ *= faded, closed_rad_ *= faded;
+  closed_m_ *= faded;
+  closed_rad_ *= faded;
   if (!sample || sample->closures == closures_) return;
   const RigidShift D = sample->map_from_odom * map_from_odom_.inverse();
   const bool first = closures_ == 0;
@@ -49,7 +50,10 @@ void FlightTick::take_closure(std::optional<OdometrySample>& sample) noexcept {
   // Written so that what is no number is refused.
   const double by = (sample->state.p_W - before.state.p_W).norm(), turn = std::abs(D.yaw);
   const bool small = closed_m_ + by <= kMaxClosure && closed_rad_ + turn <= kMaxClosureTurn;
-  if (was_commanding_ && small) closed_m_ += by, closed_rad_ += turn;
+  if (was_commanding_ && small) {
+    closed_m_ += by;
+    closed_rad_ += turn;
+  }
   if (was_commanding_ && !small) {
     closure_refused_now_ = closure_refused_ != sample->closures;
     closure_refused_ = sample->closures;

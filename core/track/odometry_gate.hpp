@@ -73,7 +73,11 @@ class OdometryGate {
   /// The map moved under the vehicle (loop closure): the last sample is what it would have said. map_new ← map_old.
   void rebase(const RigidShift& D) noexcept;
   /// After a jump: the next sample is believed whatever it says. Only while nothing is commanded.
-  void forget() noexcept { last_.reset(), fastest_ns_.reset(), drift_.begin_anew(); }
+  void forget() noexcept {
+    last_.reset();
+    fastest_ns_.reset();
+    drift_.begin_anew();
+  }
 
  private:
   bool jumps(const OdometrySample& sample, double dt) const noexcept;

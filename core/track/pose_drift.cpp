@@ -45,7 +45,11 @@ bool PoseDrift::explains(const Step& step) noexcept {
 }
 
 void PoseDrift::rebase(const RigidShift& D) noexcept {
-  for (Scale& s : scales_) s.left = D.rotate(s.left), s.way = D.rotate(s.way), s.change = D.rotate(s.change);
+  for (Scale& s : scales_) {
+    s.left = D.rotate(s.left);
+    s.way = D.rotate(s.way);
+    s.change = D.rotate(s.change);
+  }
 }
 
 }  // namespace backwash::track

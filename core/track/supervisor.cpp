@@ -23,7 +23,10 @@ double Supervisor::seconds_in_mode() const noexcept { return ticks_in_mode_ * kC
 void Supervisor::enter(Mode mode, Reason reason) noexcept {
   if (mode == mode_ && reason == reason_) return;
   // A hold that comes to distrust the pose begins anew: its time is limited.
-  if (mode != mode_ || (mode == Mode::hold && distrusts(reason) && pose_trusted())) ticks_in_mode_ = 0, outside_ = 0;
+  if (mode != mode_ || (mode == Mode::hold && distrusts(reason) && pose_trusted())) {
+    ticks_in_mode_ = 0;
+    outside_ = 0;
+  }
   mode_ = mode;
   reason_ = reason;
   changed_ = true;

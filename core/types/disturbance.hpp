@@ -13,7 +13,12 @@ struct Variance {
   double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
 
   Variance& operator+=(const Variance& o) noexcept {
-    xx += o.xx, xy += o.xy, xz += o.xz, yy += o.yy, yz += o.yz, zz += o.zz;
+    xx += o.xx;
+    xy += o.xy;
+    xz += o.xz;
+    yy += o.yy;
+    yz += o.yz;
+    zz += o.zz;
     return *this;
   }
   friend Variance operator+(Variance a, const Variance& b) noexcept { return a += b; }
@@ -66,13 +71,17 @@ inline DisturbanceBound bound(const Variance& sigma, const BoundModel& model) no
   const bool finite = std::isfinite(sigma.xx + sigma.xy + sigma.xz + sigma.yy + sigma.yz + sigma.zz);
   const auto along = [&](Direction d) { return sigma.along(unit(d)); };
   PerDirection variances;
-  variances[kX] = finite ? sigma.xx : along(kX), variances[kY] = finite ? sigma.yy : along(kY);
+  variances[kX] = finite ? sigma.xx : along(kX);
+  variances[kY] = finite ? sigma.yy : along(kY);
   variances[kZ] = finite ? sigma.zz : along(kZ);
-  variances[kXyPlus] = along(kXyPlus), variances[kXyMinus] = along(kXyMinus);
+  variances[kXyPlus] = along(kXyPlus);
+  variances[kXyMinus] = along(kXyMinus);
   const auto root = [](double variance) { return std::sqrt(variance > 0 ? variance : 0.0); };
   // Roots are dear, and Σ is often the same along both axes and both diagonals.
   PerDirection roots;
-  roots[kX] = root(variances[kX]), roots[kXyPlus] = root(variances[kXyPlus]), roots[kZ] = root(variances[kZ]);
+  roots[kX] = root(variances[kX]);
+  roots[kXyPlus] = root(variances[kXyPlus]);
+  roots[kZ] = root(variances[kZ]);
   roots[kY] = variances[kY] == variances[kX] ? roots[kX] : root(variances[kY]);
   roots[kXyMinus] = variances[kXyMinus] == variances[kXyPlus] ? roots[kXyPlus] : root(variances[kXyMinus]);
   DisturbanceBound b;

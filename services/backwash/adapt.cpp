@@ -115,7 +115,8 @@ int run(const AdaptOptions& options) {
         options.model + ":1: is an extended model, whose factors are not evaluated here; give the one before");
   const auto room = options.map.empty() ? std::nullopt : std::optional(read_map(options.map));
   adapt::InFlightConstants constants;
-  constants.controller = vehicle.controller, constants.gusts = gusts_of(options, model);
+  constants.controller = vehicle.controller;
+  constants.gusts = gusts_of(options, model);
   const auto& gusts = constants.gusts;
   Json json{{"tau_s", {gusts.tau_low_s, gusts.tau_high_s}}, {"gusts", "any"}, {"alpha", constants.alpha}};
   json["logs"] = Json::array();

@@ -68,8 +68,13 @@ std::vector<Place> places_of(const std::vector<Vec3>& path, const field::Proximi
 map::OccupancyGrid floor_below(const std::vector<Vec3>& path) {
   constexpr double kEdge = 0.1, kBeside = 2.5, kMost = 60;
   Vec3 low = path.front(), high = path.front();
-  for (const Vec3& p : path) low = low.cwiseMin(p), high = high.cwiseMax(p);
-  low.head<2>().array() -= kBeside, high.array() += kBeside, low.z() = -kEdge;
+  for (const Vec3& p : path) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  low.head<2>().array() -= kBeside;
+  high.array() += kBeside;
+  low.z() = -kEdge;
   const Index3 size = ((high - low).cwiseMin(kMost) / kEdge).array().ceil().cast<int>();
   map::OccupancyGrid grid(low, kEdge, size, map::Cell::free);
   for (int i = 0; i < size.x(); ++i)
@@ -97,7 +102,11 @@ Setpoint command_at(const log::FlightLog& log, double t, std::size_t row) {
     if (a) mean.a_W += share * log::xyz(log, "cmd_a", "_mps2", k);
   };
   const double interval = log.t_s[row + 1] - log.t_s[row], on = (t - log.t_s[row]) / interval;
-  if (interval > kNearly * kControlPeriod) return add(row, 1 - on), add(row + 1, on), mean;
+  if (interval > kNearly * kControlPeriod) {
+    add(row, 1 - on);
+    add(row + 1, on);
+    return mean;
+  }
   for (double part = 0.5; part < kParts; ++part) {
     while (row + 1 < log.t_s.size() && log.t_s[row + 1] <= t + part / kParts * kControlPeriod) ++row;
     add(row, 1 / kParts);
@@ -134,7 +143,8 @@ FlownAir read_air(const std::string& path, const Vehicle& vehicle, const Model& 
     used = row;
     tick.state = {flown[row], log::xyz(log, "v", "_mps", row)};
     tick.command = command_at(log, t, row);
-    tick.sigma = places[row].sigma, tick.air = air.attitude ? places[row].air : AirClass::none;
+    tick.sigma = places[row].sigma;
+    tick.air = air.attitude ? places[row].air : AirClass::none;
     air.ticks.push_back(tick);
   }
 }

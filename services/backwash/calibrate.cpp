@@ -71,7 +71,9 @@ Json to_json(const Campaign& campaign, const CalibrateOptions& options) {
   for (std::size_t g = 0; g < study::kHoverGates; ++g)
     gated[study::to_string(static_cast<study::Gate>(g))] = campaign.gated[g];
   Json json{{"quantile", options.quantile}, {"flights", campaign.logs.size()}, {"windows", campaign.windows}};
-  json["gated_out"] = gated, json["signal"] = campaign.signal, json["not_tested"] = campaign.not_tested;
+  json["gated_out"] = gated;
+  json["signal"] = campaign.signal;
+  json["not_tested"] = campaign.not_tested;
   if (campaign.height) {
     const auto& h = *campaign.height;
     json["height_effect"] = {
@@ -186,7 +188,9 @@ int run(const CalibrateOptions& options) {
   }
   progress("fitting " + std::to_string(campaign.windows) + " windows");
   study::calibrate::Options how;
-  how.fit.quantile = options.quantile, how.seed = options.seed, how.bootstraps = options.bootstraps;
+  how.fit.quantile = options.quantile;
+  how.seed = options.seed;
+  how.bootstraps = options.bootstraps;
   how.progress = [](std::size_t done, std::size_t of) { progress(done, of); };
   const auto calibration = calibrate(campaign.data, gates, refused, campaign.pushes, how);
   const Provenance provenance{kVersion,      options.vehicle,    options.base_model, campaign.map_names,

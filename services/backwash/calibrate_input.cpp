@@ -62,7 +62,10 @@ void add_campaign_options(Command& command, CampaignFiles& files) {
 
 Campaign empty_campaign(const CampaignFiles& files) {
   Campaign campaign{};
-  for (const auto& name : files.maps) campaign.maps.push_back(read_map(name)), campaign.map_names.push_back(name);
+  for (const auto& name : files.maps) {
+    campaign.maps.push_back(read_map(name));
+    campaign.map_names.push_back(name);
+  }
   if (files.maps.empty()) campaign.maps.push_back(flat_floor());
   return campaign;
 }
@@ -82,7 +85,8 @@ void read_logs(const CampaignFiles& files, const std::vector<map::OccupancyGrid>
     CalibratedLog one{file.path, place, flight->signal, flight->gated, flight->not_tested, flight->windows.size(),
                       {},        {}};
     if (mapless) {
-      one.map.reset(), one.heights = height_rows(*flight, log, 0);
+      one.map.reset();
+      one.heights = height_rows(*flight, log, 0);
       for (auto& w : flight->windows) w.p_W = {0, 0, std::max(0.02, w.p_W.z() - value_of(log, "surface_z_m", 0))};
     }
     one.hovers = hovers_of(*flight, 0, maps[place], gates);
@@ -103,10 +107,17 @@ void add_logs(Campaign& campaign, std::vector<CalibratedLog> logs, std::uint64_t
       if (std::find(campaign.not_tested.begin(), campaign.not_tested.end(), what) == campaign.not_tested.end())
         campaign.not_tested.push_back(what);
     }
-    for (auto& row : log.heights) row.flight = number, rows.push_back(row);
-    for (auto& hover : log.hovers) hover.flight = number, campaign.data.hovers.push_back(std::move(hover));
+    for (auto& row : log.heights) {
+      row.flight = number;
+      rows.push_back(row);
+    }
+    for (auto& hover : log.hovers) {
+      hover.flight = number;
+      campaign.data.hovers.push_back(std::move(hover));
+    }
     campaign.windows += log.windows;
-    campaign.data.place.push_back(log.map.value_or(0)), campaign.logs.push_back(log.path);
+    campaign.data.place.push_back(log.map.value_or(0));
+    campaign.logs.push_back(log.path);
   }
   campaign.signal = study::to_string(logs.front().signal);
   campaign.pushes = logs.front().signal == study::Signal::commanded;

@@ -28,8 +28,15 @@ void each_number(H& hover, F take) {
     for (int k = 0; k < 3; ++k) take(v[k]);
   };
   auto& f = hover.features;
-  three(hover.p_W), three(hover.push), three(hover.push_noise), take(hover.tau_w);
-  take(f.ground_inverse), take(f.corner_xx), take(f.corner), take(f.wall_distance), take(f.height);
+  three(hover.p_W);
+  three(hover.push);
+  three(hover.push_noise);
+  take(hover.tau_w);
+  take(f.ground_inverse);
+  take(f.corner_xx);
+  take(f.corner);
+  take(f.wall_distance);
+  take(f.height);
   for (auto* list : {&f.ground_decay, &f.wall_xx, &f.wall})
     for (auto& x : *list) take(x);
 }
@@ -86,7 +93,9 @@ CalibratedLog log_of(const Json& row, const CalibrateRowsOf& of, const std::vect
   const int signal = row.at("signal");
   if (signal < 0 || signal > static_cast<int>(study::Signal::raw)) throw std::out_of_range("signal");
   log.signal = static_cast<study::Signal>(signal);
-  log.gated = row.at("gated"), log.not_tested = row.at("not_tested"), log.windows = row.at("windows");
+  log.gated = row.at("gated");
+  log.not_tested = row.at("not_tested");
+  log.windows = row.at("windows");
   for (const auto& hover : row.at("hovers")) log.hovers.push_back(hover_of(hover));
   for (const auto& height : row.at("heights")) log.heights.push_back(height_of(height));
   return log;
@@ -98,9 +107,12 @@ std::string calibrate_row(const CalibratedLog& log, const CalibrateRowsOf& of) {
   Json row{{"log", log.path}, {"log_sha256", sha256_of_file(log.path)}};
   row["made"] = made_with(of);
   row["map"] = log.map ? Json{{"name", of.maps.at(*log.map)}, {"is", file_identity(of.maps.at(*log.map))}} : Json();
-  row["signal"] = static_cast<int>(log.signal), row["gated"] = log.gated, row["not_tested"] = log.not_tested;
+  row["signal"] = static_cast<int>(log.signal);
+  row["gated"] = log.gated;
+  row["not_tested"] = log.not_tested;
   row["windows"] = log.windows;
-  row["hovers"] = Json::array(), row["heights"] = Json::array();
+  row["hovers"] = Json::array();
+  row["heights"] = Json::array();
   for (const auto& hover : log.hovers) row["hovers"].push_back(row_of(hover));
   for (const auto& height : log.heights) row["heights"].push_back(row_of(height));
   return sealed(row);

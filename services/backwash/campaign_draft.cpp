@@ -23,7 +23,10 @@ void Draft::read(CampaignItem& item, const std::string& path) {
   if (path.empty() || path.starts_with("builtin:")) return;
   check_name(path);
   const auto [at, fresh] = number_.try_emplace(path, plan_.inputs.size());
-  if (fresh) progress("hashing " + path), plan_.inputs.push_back({path, sha256_of_file(path)});
+  if (fresh) {
+    progress("hashing " + path);
+    plan_.inputs.push_back({path, sha256_of_file(path)});
+  }
   item.inputs.push_back(at->second);
 }
 

@@ -39,7 +39,10 @@ Words with_files(const SpecTable& table, CampaignItem& item, Draft& draft) {
   Words words;
   for (const auto& [key, option] : {std::pair{"map", "--map"}, {"vehicle", "--vehicle"}, {"model", "--model"}}) {
     const auto path = table.text(key, "");
-    if (!path.empty()) append(words, {option, path}), draft.read(item, path);
+    if (!path.empty()) {
+      append(words, {option, path});
+      draft.read(item, path);
+    }
   }
   return words;
 }
@@ -52,7 +55,8 @@ void add_in_parts(const SpecTable& spec, const Words& logs, const Words& before,
     Words words = before;
     CampaignItem own{{}, files, 0};
     for (std::size_t n = 0; k < logs.size() && n < kMostLogs && own.seconds < least_s; ++n, ++k) {
-      words.push_back(logs[k]), own.seconds += log_seconds(spec, logs[k], kRow);
+      words.push_back(logs[k]);
+      own.seconds += log_seconds(spec, logs[k], kRow);
       draft.read(own, logs[k]);
     }
     auto item = verb_item(words, own.seconds);
@@ -76,10 +80,12 @@ void plan_one_study(const SpecTable& spec, const SpecTable& table, CampaignPlan&
   const auto group = table.text("group", "");
   if (!group.empty()) append(given, {"--group", group});
   Words rows = {"study", "--rows"};
-  append(rows, given), rows.push_back("--log");
+  append(rows, given);
+  rows.push_back("--log");
   add_in_parts(spec, logs, rows, files.inputs, draft);
   plan.last = {"backwash", "study", "--from", "{rows}", "--json", "--quiet"};
-  append(plan.last, given), append(plan.last, table.texts("options", Words{}));
+  append(plan.last, given);
+  append(plan.last, table.texts("options", Words{}));
 }
 
 }  // namespace
@@ -95,7 +101,8 @@ void plan_study(const SpecTable& spec, CampaignPlan& plan, Draft& draft) {
     const auto logs = files_in(folder);
     CampaignItem files{{}, {}, 0};
     Words words = {"study", "--json"};
-    append(words, with_files(table, files, draft)), append(words, table.texts("options", Words{}));
+    append(words, with_files(table, files, draft));
+    append(words, table.texts("options", Words{}));
     words.push_back("--log");
     append(words, logs);
     double seconds = 0;
@@ -117,7 +124,10 @@ void plan_calibrate(const SpecTable& spec, CampaignPlan& plan, Draft& draft) {
   Words given;
   for (const auto& [key, option] : {std::pair{"vehicle", "--vehicle"}, {"base_model", "--base-model"}}) {
     const auto path = table.text(key, "");
-    if (!path.empty()) append(given, {option, path}), draft.read(files, path);
+    if (!path.empty()) {
+      append(given, {option, path});
+      draft.read(files, path);
+    }
   }
   plan.last = {"backwash", "calibrate", "--from", "{rows}", "--json", "--quiet"};
   append(plan.last, given);
@@ -128,8 +138,12 @@ void plan_calibrate(const SpecTable& spec, CampaignPlan& plan, Draft& draft) {
     append(rows, given);
     if (!maps.empty()) {
       const auto& map = maps[std::min(k, maps.size() - 1)];
-      append(rows, {"--map", map}), draft.read(own, map);
-      if (std::ranges::find(listed, map) == listed.end()) listed.push_back(map), append(plan.last, {"--map", map});
+      append(rows, {"--map", map});
+      draft.read(own, map);
+      if (std::ranges::find(listed, map) == listed.end()) {
+        listed.push_back(map);
+        append(plan.last, {"--map", map});
+      }
     }
     rows.push_back("--log");
     add_in_parts(spec, files_in(places[k]), rows, own.inputs, draft);
@@ -143,7 +157,8 @@ void plan_adapt(const SpecTable& spec, CampaignPlan&, Draft& draft) {
     for (const auto& path : files_in(place)) {
       CampaignItem files{{}, {}, 0};
       Words words = {"adapt", path, "--json"};
-      append(words, with_files(table, files, draft)), append(words, table.texts("options", Words{}));
+      append(words, with_files(table, files, draft));
+      append(words, table.texts("options", Words{}));
       auto item = verb_item(words, log_seconds(spec, path, kWhole));
       item.inputs = files.inputs;
       draft.read(item, path);

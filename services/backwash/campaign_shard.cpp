@@ -180,16 +180,20 @@ Survey survey(const std::string& folder, const CampaignPlan& plan, const std::fu
     else if (known != by_number.end())
       found.wrong.push_back(path + ":1: is shard " + std::to_string(rows->shard) + ", which " + known->second +
                             " is, too; remove one of them");
-    else
-      by_number.emplace(rows->shard, path), take(std::move(*rows));
+    else {
+      by_number.emplace(rows->shard, path);
+      take(std::move(*rows));
+    }
   }
   double left_estimate_s = 0;
   for (std::size_t k = 0; k < plan.shards.size(); ++k) {
     if (by_number.contains(k)) {
       found.done.push_back(k);
       double seconds = 0;
-      if (std::ifstream(path_of(folder, k, ".seconds")) >> seconds)
-        found.done_s += seconds, found.done_estimate_s += plan.seconds(k);
+      if (std::ifstream(path_of(folder, k, ".seconds")) >> seconds) {
+        found.done_s += seconds;
+        found.done_estimate_s += plan.seconds(k);
+      }
       continue;
     }
     (locked(part_path(folder, k)) ? found.running : found.missing).push_back(k);

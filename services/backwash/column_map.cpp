@@ -155,7 +155,8 @@ tl::expected<ColumnMap, config::ConfigError> read_column_map(const std::string& 
   const auto ned = one_of("frame.world", "enu", "ned"), frd = one_of("frame.body", "flu", "frd");
   if (!ned) return tl::make_unexpected(ned.error());
   if (!frd) return tl::make_unexpected(frd.error());
-  map.ned = *ned, map.frd = *frd;
+  map.ned = *ned;
+  map.frd = *frd;
   for (const auto& name : log::mappable_columns()) {
     const std::string key = "columns." + name;
     if (!table->has(key)) continue;
@@ -210,12 +211,16 @@ tl::expected<std::string, log::LogError> proposed_column_map(const std::string& 
     for (const bool ned : {false, true})
       for (const bool frd : {false, true}) {
         ColumnMap map = base;
-        map.ned = ned, map.frd = frd;
+        map.ned = ned;
+        map.frd = frd;
         for (const char c : std::string(kind.empty() ? "" : "xyz"))
           map.columns[filled(kind, c)] = {found.at(std::string("acceleration_") + c), unit};
         const auto flight = log::import_unchecked(table, map);
         const auto wrong = flight ? log::contradictions(*flight) : std::vector<std::string>{flight.error().message};
-        if (!doubts || wrong.size() < doubts->size()) best = map, doubts = wrong;
+        if (!doubts || wrong.size() < doubts->size()) {
+          best = map;
+          doubts = wrong;
+        }
       }
   return written(best, *doubts);
 }

@@ -79,8 +79,10 @@ Json to_json(const report::Comparison& c) {
   for (std::size_t m = 0; m < c.methods.size(); ++m) methods.push_back(to_json(c.table.rows[m], c.methods[m], c.timed));
   for (const auto& scene : c.scenes) {
     Json solved, contacts;
-    for (const auto& row : sim::tabulate(std::span(&scene, 1), c.methods, c.seed).rows)
-      solved[row.method] = row.solved, contacts[row.method] = row.contacts;
+    for (const auto& row : sim::tabulate(std::span(&scene, 1), c.methods, c.seed).rows) {
+      solved[row.method] = row.solved;
+      contacts[row.method] = row.contacts;
+    }
     scenes.push_back({{"scene", scene.scene},
                       {"vehicle", scene.vehicle},
                       {"pairs", scene.pairs.size()},

@@ -48,10 +48,17 @@ sim::RouteOutcome outcome_of(const Json& row) {
   o.status = *known;
   o.clearance_m = std::numeric_limits<double>::infinity();  // as measure() leaves it without a flight
   if (o.status != PlanStatus::ok) return o;
-  o.planned.length_m = row.at("length_m"), o.planned.time_s = row.at("time_s"), o.planned.jerk2 = row.at("jerk2");
-  o.flown_m = row.at("flown_m"), o.flown_jerk2 = row.at("flown_jerk2"), o.energy_J = row.at("energy_J");
-  o.clearance_m = row.at("clearance_m"), o.samples = row.at("samples"), o.contacts = row.at("contact_samples");
-  o.outside = row.at("samples_outside"), o.largest_ratio = point_of(row.at("largest_ratio"));
+  o.planned.length_m = row.at("length_m");
+  o.planned.time_s = row.at("time_s");
+  o.planned.jerk2 = row.at("jerk2");
+  o.flown_m = row.at("flown_m");
+  o.flown_jerk2 = row.at("flown_jerk2");
+  o.energy_J = row.at("energy_J");
+  o.clearance_m = row.at("clearance_m");
+  o.samples = row.at("samples");
+  o.contacts = row.at("contact_samples");
+  o.outside = row.at("samples_outside");
+  o.largest_ratio = point_of(row.at("largest_ratio"));
   return o;
 }
 
@@ -74,8 +81,10 @@ sim::GapCampaign gap_of(const Json& row) {
                        {}};
   for (const auto& s : row.at("shown")) {
     track::Inside inside;
-    for (std::size_t k = 0; k < inside.error.size(); ++k)
-      inside.error[k] = s.at(0).at(k), inside.half_widths[k] = s.at(1).at(k);
+    for (std::size_t k = 0; k < inside.error.size(); ++k) {
+      inside.error[k] = s.at(0).at(k);
+      inside.half_widths[k] = s.at(1).at(k);
+    }
     gap.shown.push_back(inside);
   }
   return gap;

@@ -203,7 +203,10 @@ int run(const FieldOptions& options) {
   if (!options.vehicle.empty()) model.ground.r0 = read_vehicle(options.vehicle).body.diagonal_radius;
 
   std::vector<Vec3> points;
-  if (options.at) check_free(grid, *options.at, options.map), points = {*options.at};
+  if (options.at) {
+    check_free(grid, *options.at, options.map);
+    points = {*options.at};
+  }
   if (!options.points.empty()) points = read_points(options.points);
   if (slice) points = slice_points(grid, *slice);
   if (slice && points.empty()) throw Failure(kBadData, empty_slice(options, grid, *slice));

@@ -55,7 +55,10 @@ class Teller {
     for (const auto& news : air_.take(record)) say("air", news);
     if (kind == command) take_command(text);
     if (kind == ack) take_answer(text);
-    if (kind == failure) failure_ = text, say("fault", "the daemon ended itself: " + text);
+    if (kind == failure) {
+      failure_ = text;
+      say("fault", "the daemon ended itself: " + text);
+    }
     if (kind == lost)
       if (const auto* lost_records = log::payload<log::LostRecord>(record)) {
         story_.records_lost = lost_records->records;
@@ -68,7 +71,9 @@ class Teller {
   }
 
   void finish(bool cut, const std::string& because) {
-    open_ = false, close_mode(), story_.maps = maps_.maps();
+    open_ = false;
+    close_mode();
+    story_.maps = maps_.maps();
     std::ranges::stable_sort(story_.timeline.events, {}, &report::TimelineEvent::t_s);  // of several threads
     story_.time_s = story_.samples.empty() ? std::max(now_s_, 0.0) : last_tick_s_.value();
     if (!last_tick_s_)
@@ -131,13 +136,21 @@ class Teller {
     StorySample s{now_s_, vec(tick.p), vec(tick.cmd_p), tick.judged != 0, tick.inside != 0, in_air_, Vec3::Zero(), {}};
     const auto true_W =
         truth_ ? truth_->at(1e-9 * static_cast<double>(t_ns), "x_m", "y_m", "z_m") : std::optional<Vec3>();
-    s.p_W = true_W.value_or(s.p_W), story_.beyond_truth += truth_ && !true_W;
+    s.p_W = true_W.value_or(s.p_W);
+    story_.beyond_truth += truth_ && !true_W;
     if (s.judged) take_verdict(tick, s);
-    if (in_air_ && !was_in_air_) ++story_.take_offs, say("flight", "in the air");
-    if (!in_air_ && was_in_air_) ++story_.landings, say("flight", "on the ground");
+    if (in_air_ && !was_in_air_) {
+      ++story_.take_offs;
+      say("flight", "in the air");
+    }
+    if (!in_air_ && was_in_air_) {
+      ++story_.landings;
+      say("flight", "on the ground");
+    }
     if (in_air_ && was_in_air_ && !story_.samples.empty())
       story_.length_m += (s.p_W - story_.samples.back().p_W).norm();
-    was_in_air_ = in_air_, flown_ &= in_air_;
+    was_in_air_ = in_air_;
+    flown_ &= in_air_;
     if (flying) take_piece(tick, s);
     if (in_air_ && open_) measure(tick, t_ns, s);
     story_.samples.push_back(s);
@@ -162,12 +175,14 @@ class Teller {
     if (open_ && ordered_) end_by_order(story_.pieces.back());
     if (!last_tick_s_ || tick.mode != mode_) {
       const std::string from = !last_tick_s_ ? "" : mode() + " → ";
-      mode_ = tick.mode, reason_ = tick.reason;
+      mode_ = tick.mode;
+      reason_ = tick.reason;
       say("mode", from + mode() + ": " + reason());
       story_.holds += static_cast<Mode>(tick.mode) == Mode::hold;
       if (in_air_ && static_cast<Mode>(tick.mode) != Mode::passive) fault_ = as_asked(said) ? "" : reason();
     }
-    mode_ = tick.mode, reason_ = tick.reason;
+    mode_ = tick.mode;
+    reason_ = tick.reason;
     story_.timeline.modes.push_back({now_s_, now_s_, mode(), reason()});
     if (as_asked(said) || static_cast<Mode>(tick.mode) == Mode::tracking) return;
     last_fault_ = reason();
@@ -182,7 +197,8 @@ class Teller {
   static void end_by_order(StoryPiece& piece) { piece.by_order |= !piece.to_its_end && piece.fault.empty(); }
 
   void take_verdict(const log::TickRecord& tick, StorySample& s) {
-    ++story_.judged, story_.inside += s.inside;
+    ++story_.judged;
+    story_.inside += s.inside;
     const Vec3 error = vec(tick.p) - vec(tick.center);
     for (int axis = 0; axis < 3; ++axis) {
       const double h = tick.half_widths[axis];
@@ -201,15 +217,20 @@ class Teller {
         if (open_ && ordered_) end_by_order(story_.pieces.back());
         story_.pieces.push_back({});
         auto& piece = story_.pieces.back();
-        piece.take_off = known == segments_.end() || (report::vertical(*known) && !flown_), piece.from_s = now_s_;
+        piece.take_off = known == segments_.end() || (report::vertical(*known) && !flown_);
+        piece.from_s = now_s_;
       }
-      open_ = true, ordered_ = false, segment_ = tick.segment;
+      open_ = true;
+      ordered_ = false;
+      segment_ = tick.segment;
       commands_ = known != segments_.end() ? known->commands.size() : 0;
       story_.pieces.back().goal_W = commands_ > 0 ? known->commands.back().p_W : s.command_W;
     }
     auto& piece = story_.pieces.back();
-    piece.until_s = now_s_, flown_ |= in_air_;
-    piece.samples += s.judged, piece.inside += s.judged && s.inside;
+    piece.until_s = now_s_;
+    flown_ |= in_air_;
+    piece.samples += s.judged;
+    piece.inside += s.judged && s.inside;
     const auto m = static_cast<Mode>(tick.mode);
     if (m == Mode::tracking && commands_ > 0 && tick.index + 1 >= commands_) {
       piece.to_its_end = true;
@@ -279,7 +300,9 @@ bool FlightStory::goal_reached() const noexcept {
 FlightStory flight_story(const log::RawLog& log, const Vehicle& vehicle, const log::FlightLog* truth,
                          const std::string& because) {
   FlightStory story;
-  story.zero_ns = report::first_tick_ns(log.records), story.by_truth = truth != nullptr, story.cut_at = log.cut_at;
+  story.zero_ns = report::first_tick_ns(log.records);
+  story.by_truth = truth != nullptr;
+  story.cut_at = log.cut_at;
   story.replay = log::replay(log, "the log");
   Teller teller(story, log, vehicle, truth);
   for (const auto& record : log.records) teller.take(record);

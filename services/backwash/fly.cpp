@@ -88,7 +88,8 @@ int run(const FlyOptions& options) {
                                     .terms = read_simulation(model_path),
                                     .limits = {.v_max = vehicle.limits.v_max, .a_max = vehicle.limits.a_max}};
   const auto ends = choose_ends(options, *world, flight_options);
-  flight_options.start_W = ends.start_W, flight_options.goal_W = ends.goal_W;
+  flight_options.start_W = ends.start_W;
+  flight_options.goal_W = ends.goal_W;
   if (options.ends) return print_ends(ends);
   progress("flying");
   const auto flight = sim::fly(*world, vehicle, model.bound, flight_options);

@@ -42,8 +42,10 @@ void MapJudge::count(const log::RawRecord& record) {
   }
   std::size_t gone = 0, occupied = 0;
   if (kind == log::RecordKind::world &&
-      std::sscanf(text.c_str(), "window: %zu voxels far from it are let go, %zu of them", &gone, &occupied) == 2)
-    maps_.let_go += gone, maps_.let_go_occupied += occupied;
+      std::sscanf(text.c_str(), "window: %zu voxels far from it are let go, %zu of them", &gone, &occupied) == 2) {
+    maps_.let_go += gone;
+    maps_.let_go_occupied += occupied;
+  }
 }
 
 /// Which map was the newest, 0: none had come. One at a time is kept: a mapper may send hundreds.
@@ -52,7 +54,9 @@ std::size_t MapJudge::use_newest(std::int64_t t_ns) {
   const auto n = static_cast<std::size_t>(later - records_.begin());
   if (n == used_) return n;
   used_ = n;
-  grid_.reset(), distance_.reset(), unreadable_.clear();
+  grid_.reset();
+  distance_.reset();
+  unreadable_.clear();
   if (n == 0) return n;
   auto grid = report::recorded_map(*records_[n - 1]);
   if (!grid) {

@@ -24,7 +24,8 @@ double middle_height(const map::OccupancyGrid& grid) {
   std::size_t all = 0;
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     const bool is_free = grid.at(n) == map::Cell::free;
-    free[static_cast<std::size_t>(grid.voxel(n).z())] += is_free, all += is_free;
+    free[static_cast<std::size_t>(grid.voxel(n).z())] += is_free;
+    all += is_free;
   }
   int layer = 0;
   for (std::size_t below = free[0]; 2 * below < all; below += free[static_cast<std::size_t>(layer)]) ++layer;

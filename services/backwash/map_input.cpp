@@ -115,7 +115,10 @@ MadeMap from_geometry(const MapOptions& options) {
   const auto place = placement(options, geometry.up);
   check_precision(options, geometry, resolution, place.scale);
   std::pair<Vec3, Vec3> box{place(geometry.points[0]), place(geometry.points[0])};
-  const auto put = [&](Vec3& p) { p = place(p), box = {box.first.cwiseMin(p), box.second.cwiseMax(p)}; };
+  const auto put = [&](Vec3& p) {
+    p = place(p);
+    box = {box.first.cwiseMin(p), box.second.cwiseMax(p)};
+  };
   for (Vec3& p : geometry.points) put(p);
   for (Vec3& sensor : geometry.sensors) put(sensor);
   if (geometry.triangles.empty())
@@ -137,7 +140,10 @@ MadeMap from_geometry(const MapOptions& options) {
                          std::to_string(*geometry.first_not_finite));
   if (mesh && (!options.sensors.empty() || options.points_least > 1))
     throw Failure(kUsage, "--sensor and --points-least are of clouds; " + options.file + " is a mesh");
-  if (mesh) return add_mesh(geometry, made), made;
+  if (mesh) {
+    add_mesh(geometry, made);
+    return made;
+  }
   map::add_points(made.grid, geometry.points, options.points_least);
   free_rays(options, geometry, made);
   return made;

@@ -47,8 +47,12 @@ class Display {
   }
   void set(std::size_t done, std::size_t of) {
     const std::lock_guard lock(mutex_);
-    if (of_ != of || done == 0) begun_ = Clock::now(), done_ = 0;
-    done_ = std::max(done_, done), of_ = of;  // threads may be late with what they say
+    if (of_ != of || done == 0) {
+      begun_ = Clock::now();
+      done_ = 0;
+    }
+    done_ = std::max(done_, done);
+    of_ = of;  // threads may be late with what they say
   }
   void end() {
     if (!thread_.joinable()) return;

@@ -151,7 +151,8 @@ reach::ChanceTube tube(const ReachOptions& options, const reach::Reachability& r
     std::vector<DisturbanceBound> bounds;
     bounds.reserve(sigma.size());
     reach::FieldExtremes most;
-    most.level = model.mean_horizontal, most.vertical = model.mean_vertical;
+    most.level = model.mean_horizontal;
+    most.vertical = model.mean_vertical;
     for (const Variance& s : sigma) {
       bounds.push_back(bound(s, model));
       for (std::size_t d = 0; d < kDirections; ++d) {

@@ -63,7 +63,10 @@ report::DataTable clearance_table(const FlightStory& story) {
 report::Figure path_figure(const FlightStory& story, const report::DataTable& path, const map::OccupancyGrid* map,
                            std::span<const report::Prism> tube) {
   Vec3 low = story.samples.front().p_W, high = low;
-  for (const auto& s : story.samples) low = low.cwiseMin(s.p_W), high = high.cwiseMax(s.p_W);
+  for (const auto& s : story.samples) {
+    low = low.cwiseMin(s.p_W);
+    high = high.cwiseMax(s.p_W);
+  }
   std::ostringstream data;
   data << "$flown << EOD\n";
   for (const auto& row : path.rows)

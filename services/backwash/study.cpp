@@ -52,8 +52,10 @@ std::string residuals(const StudyOptions& options, const Flights& flights, const
                       const map::OccupancyGrid& grid, const study::Observations& measured,
                       const std::vector<SimulationTerm>& found) {
   FlownAgain again{{}, {}, vehicle, model, grid, options.seed};
-  for (const std::size_t k : flights.order())
-    again.logs.push_back(&flights.logs[k]), again.paths.push_back(flights.paths[k]);
+  for (const std::size_t k : flights.order()) {
+    again.logs.push_back(&flights.logs[k]);
+    again.paths.push_back(flights.paths[k]);
+  }
   auto terms = read_simulation(options.model);
   progress("simulating the flights without the causes");
   const auto before = simulated(again, terms, measured);
@@ -127,7 +129,10 @@ void check(const StudyOptions& options) {
   if (options.anytime && !options.group.empty())
     throw Failure(kUsage, "--anytime takes flights one by one, in the order of --log: give it without --group");
   if (!options.fleet.empty() && !options.anytime) throw Failure(kUsage, "--fleet needs --anytime");
-  if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
+  if (!options.reference.empty()) {
+    refuse_other_numbers(options.logs);
+    refuse_other_numbers(options.reference);
+  }
   check_design(options.design, options.map, options.force);
   check_outputs({options.report, options.out, options.design.points}, options.force);
 }
@@ -204,7 +209,10 @@ int print_rows(const StudyOptions& options, const LookedWith& with) {
 }
 
 int run(const StudyOptions& options) {
-  if (options.rules) return print_rules(options.json), kOk;
+  if (options.rules) {
+    print_rules(options.json);
+    return kOk;
+  }
   check(options);
   const auto vehicle = read_vehicle(options.vehicle);
   auto model = read_model(options.model);
@@ -291,7 +299,10 @@ Verb study_verb(Command& app) {
   command.footer(
       "Example:\n  backwash study --map room.bt --model builtin:quad-5in --vehicle builtin:quad-5in --log flight*.csv "
       "--report study.html --out extended.toml");
-  return {&command, [options] { return keep_pages(), run(*options); }};
+  return {&command, [options] {
+            keep_pages();
+            return run(*options);
+          }};
 }
 
 }  // namespace backwash::services

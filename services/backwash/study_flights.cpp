@@ -31,14 +31,19 @@ void refuse_below(const std::string& path, const log::FlightLog& log, const map:
 /// Leaves out each flight that is another one again, both by their numbers.
 void leave_out(Flights& flights, const std::vector<std::pair<std::size_t, std::size_t>>& twins) {
   std::vector<char> left(flights.paths.size(), 0);
-  for (const auto& [twin, known] : twins)
-    flights.twice.emplace_back(flights.paths[twin], flights.paths[known]), left[twin] = 1;
+  for (const auto& [twin, known] : twins) {
+    flights.twice.emplace_back(flights.paths[twin], flights.paths[known]);
+    left[twin] = 1;
+  }
   const auto keep = [&](auto& list) {
     std::size_t k = 0;
     std::erase_if(list, [&](auto&) { return left[k++] != 0; });
   };
   if (twins.empty()) return;
-  keep(flights.paths), keep(flights.observed), keep(flights.group), keep(flights.logs);
+  keep(flights.paths);
+  keep(flights.observed);
+  keep(flights.group);
+  keep(flights.logs);
 }
 
 }  // namespace
@@ -82,7 +87,8 @@ Flights each_once(std::vector<StudiedFlight> studied, bool grouped, std::vector<
   Flights flights;
   std::vector<log::FlightMark> marks;
   for (auto& flight : studied) {
-    flights.paths.push_back(std::move(flight.path)), flights.observed.push_back(std::move(flight.observed));
+    flights.paths.push_back(std::move(flight.path));
+    flights.observed.push_back(std::move(flight.observed));
     if (grouped) flights.group.push_back(flight.group);
     marks.push_back(std::move(flight.mark));
   }
@@ -117,7 +123,10 @@ std::vector<std::string> Flights::names() const {
   return names;
 }
 
-void keep_pages() { ::mallopt(M_MMAP_THRESHOLD, 1 << 30), ::mallopt(M_TRIM_THRESHOLD, 1 << 30); }
+void keep_pages() {
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  ::mallopt(M_TRIM_THRESHOLD, 1 << 30);
+}
 
 study::Observations observations(Flights& flights, const LookedWith& with) {
   const auto order = flights.order();

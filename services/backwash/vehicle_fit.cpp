@@ -105,7 +105,10 @@ int fit_vehicle(const VehicleFitOptions& options) {
                               " cannot say by how much flights do");
   std::vector<log::FlightLog> logs;
   std::vector<LoopLog> named;
-  for (const auto& path : options.logs) progress("reading " + path), logs.push_back(read_studied(path));
+  for (const auto& path : options.logs) {
+    progress("reading " + path);
+    logs.push_back(read_studied(path));
+  }
   for (std::size_t n = 0; n < logs.size(); ++n) named.push_back({options.logs[n], &logs[n]});
   progress("fitting the loop");
   const auto fit = fit_loop(named, vehicle);

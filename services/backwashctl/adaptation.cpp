@@ -53,12 +53,15 @@ int Verbs::adaptation() {
   if (air_order_ == "thaw") return ask(backwash_msgs_msg_dds__COMMAND_AIR_THAW);
   Station station(options_);
   const auto now = station.status(options_.timeout_s);
-  if (!now) return services::say_error("backwashctl adaptation", nobody()), kUnavailable;
+  if (!now) {
+    services::say_error("backwashctl adaptation", nobody());
+    return kUnavailable;
+  }
   const auto air = dds::air_said(now->air);
-  if (!air && !now->air.empty())
-    return services::say_error("backwashctl adaptation",
-                               "the daemon is of another version: it says '" + now->air + "'"),
-           kUnavailable;
+  if (!air && !now->air.empty()) {
+    services::say_error("backwashctl adaptation", "the daemon is of another version: it says '" + now->air + "'");
+    return kUnavailable;
+  }
   if (json_)
     std::cout << json_of(air).dump(2) << "\n";
   else

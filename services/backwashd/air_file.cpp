@@ -105,7 +105,10 @@ void run_air_file(const AirFile& file, Channels& channels, const std::atomic<boo
     if (!taken && !std::exchange(failing, true))
       spdlog::warn("the factors of the air cannot be kept: {}; after a restart they are learnt anew",
                    std::strerror(errno));
-    if (taken) newest.reset(), failing = false;
+    if (taken) {
+      newest.reset();
+      failing = false;
+    }
   }
 }
 

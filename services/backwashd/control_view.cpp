@@ -53,12 +53,16 @@ void ControlLoop::tell_of_air(const AirFactors& before, const track::TickInput& 
 // What an operator asks of it; the mission has judged it by what it was shown, which may be a moment old.
 void ControlLoop::carry_out(adapt::AirOrder order, const track::TickInput& in) noexcept {
   log::AirOrderRecord r{};
-  r.tick = view_.ticks, r.order = static_cast<std::uint32_t>(order);
+  r.tick = view_.ticks;
+  r.order = static_cast<std::uint32_t>(order);
   const bool changed = log::carry_out(*air_, in, r);
   record(log::RecordKind::air_order, in.now_ns, &r, sizeof r);
   if (r.done == 0)
     channels_.events.push_or_count({ControlEvent::Kind::air_kept, in.now_ns, view_.mode, view_.reason, 0});
-  if (order == adapt::AirOrder::reset && r.done != 0) ++air_falls_, view_.air.emplace();
+  if (order == adapt::AirOrder::reset && r.done != 0) {
+    ++air_falls_;
+    view_.air.emplace();
+  }
   view_.air->frozen = air_->frozen();
   if (changed) hand_over_air();
 }

@@ -19,8 +19,10 @@ void verify(Flying& flying, const plan::World& world, std::size_t now) {
   s.tube = plan::tube_to_rest(world, flying.start, flying.previous, s.commands);
   s.clearance = clearance_from(flying, world, s.tube, now);
   s.air = world.air.factors;
-  if (const auto& stated = world.bounds.model().stated)
-    s.worst = stated->worst, s.worst_at_rest = stated->worst / stated->at_rest;
+  if (const auto& stated = world.bounds.model().stated) {
+    s.worst = stated->worst;
+    s.worst_at_rest = stated->worst / stated->at_rest;
+  }
 }
 
 void add_guards(Flying& flying, const plan::World& world, std::size_t now) {

@@ -142,7 +142,10 @@ tl::expected<OdometrySample, std::string> Localization::odometry(const dds::Odom
 void Localization::settle() {
   if (!newest_ || (map_from_odom_ && p_O_ && step_to(*newest_) <= max_sigma_)) return;
   const bool repeats = map_from_odom_ && map_from_odom_->yaw == newest_->yaw && map_from_odom_->t == newest_->t;
-  if (!repeats) map_from_odom_ = *newest_, ++closures_;
+  if (!repeats) {
+    map_from_odom_ = *newest_;
+    ++closures_;
+  }
   newest_.reset();
 }
 

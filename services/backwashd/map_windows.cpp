@@ -89,7 +89,10 @@ bool MapWorker::hear() {
   std::vector<std::unique_ptr<WindowCloud>> clouds;
   for (bool more = true; std::exchange(more, false);) {
     while (const auto next = channels_.windows.pop()) clouds.emplace_back(*next);
-    while (const auto next = channels_.scans.pop()) scans.emplace_back(*next), more = true;
+    while (const auto next = channels_.scans.pop()) {
+      scans.emplace_back(*next);
+      more = true;
+    }
   }
   auto cloud = clouds.begin();
   const auto clouds_before = [&](std::int64_t ns) {

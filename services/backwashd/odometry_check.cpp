@@ -35,8 +35,11 @@ std::optional<std::string> OdometryCheck::look(std::int64_t stamp_ns, const Vec3
     compare(dt, p, q, v);
   } else {
     zero_from_.reset();
-    zero_way_ = 0, count_ = 0;
-    from_ = p, by_body_ = by_world_ = Vec3::Zero(), lasted_ = 0;
+    zero_way_ = 0;
+    count_ = 0;
+    from_ = p;
+    by_body_ = by_world_ = Vec3::Zero();
+    lasted_ = 0;
   }
   std::string now = doubt();
   if (now == told_) return std::nullopt;
@@ -64,7 +67,11 @@ void OdometryCheck::compare(double dt, const Vec3& p, const Eigen::Quaterniond& 
   const Vec3 way = p - from_;
   const bool long_enough = way.norm() >= kStretch;
   if (long_enough) stretches_[count_++ % kStretches] = {way.norm(), (way - by_body_).norm(), (way - by_world_).norm()};
-  if (long_enough || lasted_ > kLongest) from_ = p, by_body_ = by_world_ = Vec3::Zero(), lasted_ = 0;
+  if (long_enough || lasted_ > kLongest) {
+    from_ = p;
+    by_body_ = by_world_ = Vec3::Zero();
+    lasted_ = 0;
+  }
 }
 
 std::string OdometryCheck::doubt() {

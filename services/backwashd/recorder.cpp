@@ -151,7 +151,10 @@ bool Recorder::still_there() const {
 }
 
 bool Recorder::write(const std::vector<std::uint8_t>& bytes) {
-  if (!room_for(file_.get(), bytes.size())) return errno = ENOSPC, false;
+  if (!room_for(file_.get(), bytes.size())) {
+    errno = ENOSPC;
+    return false;
+  }
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t n = ::write(file_.get(), bytes.data() + done, bytes.size() - done);
@@ -246,8 +249,14 @@ void Recorder::drain(Channels& channels) {
   const auto when_full = [&] {
     if (batch_.size() > kChunk) write_batch(channels.records_lost());
   };
-  while (const auto record = channels.control_log.pop()) put_control(*record), when_full();
-  while (const auto record = channels.command_log.pop()) put_control(*record), when_full();
+  while (const auto record = channels.control_log.pop()) {
+    put_control(*record);
+    when_full();
+  }
+  while (const auto record = channels.command_log.pop()) {
+    put_control(*record);
+    when_full();
+  }
   std::vector<BulkRecord> bulk;
   {
     const std::lock_guard lock(mutex_);

@@ -50,9 +50,12 @@ tl::expected<Settings, StartError> load_settings(const std::string& path) {
   if (!tau) return wrong(tau.error());
   adapt::InFlightConstants air;
   air.controller = vehicle->controller;
-  air.alpha = daemon->adaptation.alpha, air.calmest = daemon->adaptation.calmest;
-  air.gusts.tau_low_s = (*tau)[0], air.gusts.tau_high_s = (*tau)[1];
-  air.gusts.mean_horizontal = model->bound.mean_horizontal, air.gusts.mean_vertical = model->bound.mean_vertical;
+  air.alpha = daemon->adaptation.alpha;
+  air.calmest = daemon->adaptation.calmest;
+  air.gusts.tau_low_s = (*tau)[0];
+  air.gusts.tau_high_s = (*tau)[1];
+  air.gusts.mean_horizontal = model->bound.mean_horizontal;
+  air.gusts.mean_vertical = model->bound.mean_vertical;
   return Settings{std::move(*daemon), std::move(*vehicle), std::move(*model), std::move(credentials), air};
 }
 

@@ -20,7 +20,8 @@ float value(const std::optional<double>& said) { return said ? static_cast<float
 const dds::BatteryState* ShownBattery::next(const firmware_bridge::Latest<firmware_bridge::Battery>& said,
                                             firmware_bridge::Time now, std::int64_t wall_ns) {
   if (said ? said_ == said->at || (sent_ && now - *sent_ < kEvery) : !said_) return nullptr;
-  said_ = said ? std::optional(said->at) : std::nullopt, sent_ = now;
+  said_ = said ? std::optional(said->at) : std::nullopt;
+  sent_ = now;
   static const std::string nothing;
   char* const none = dds::c_string(nothing);
   constexpr std::int64_t kSecond_ns = 1'000'000'000;

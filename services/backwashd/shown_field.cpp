@@ -48,7 +48,9 @@ bool FieldShows::due(const plan::World& world, const Vec3& vehicle_W, std::int64
   const bool same_layer = world_ && world.grid.index(vehicle_W).z() == world.grid.index(vehicle_W_).z();
   const bool near = (vehicle_W - vehicle_W_).head<2>().norm() < ShownField::kAround / 10;
   if (world_ == &world && same_layer && near) return false;
-  world_ = &world, vehicle_W_ = vehicle_W, last_ns_ = now_ns;
+  world_ = &world;
+  vehicle_W_ = vehicle_W;
+  last_ns_ = now_ns;
   return true;
 }
 

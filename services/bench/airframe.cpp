@@ -58,7 +58,10 @@ void Airframe::step(const Rotors& commands, const Vec3& w_W) {
   if (turn > 0) attitude_ = (attitude_ * Eigen::AngleAxisd(turn, rates_.normalized())).normalized();
   state_.v_W += kStep * acceleration_;
   state_.p_W += kStep * state_.v_W;
-  if (state_.p_W.z() < floor_) state_.p_W.z() = floor_, state_.v_W.z() = std::max(0.0, state_.v_W.z());
+  if (state_.p_W.z() < floor_) {
+    state_.p_W.z() = floor_;
+    state_.v_W.z() = std::max(0.0, state_.v_W.z());
+  }
 }
 
 }  // namespace backwash::bench

@@ -93,7 +93,11 @@ class ArduCopter : public Firmware {
         return arm(m.param1 == 1, t);
       case kTakeOff: {
         const bool can = armed_ && land_complete_ && mode_ == guided && m.param7 > 0;
-        if (can) take_off_ = true, take_off_at_ = t, height_ = m.param7;
+        if (can) {
+          take_off_ = true;
+          take_off_at_ = t;
+          height_ = m.param7;
+        }
         return answer(kTakeOff, can ? kAccepted : kFailed);
       }
       case kLand:
@@ -159,7 +163,8 @@ class ArduCopter : public Firmware {
         s = shaped(s, {target_.p_W[i], target_.v_W[i], target_.a_W[i]}, i == 2 ? along : across, kStep);
       }
     } else {
-      x = shaped_velocity(x, 0, across, kStep), y = shaped_velocity(y, 0, across, kStep);
+      x = shaped_velocity(x, 0, across, kStep);
+      y = shaped_velocity(y, 0, across, kStep);
       if (mode_ == rtl) along = kReturn;
       if (climbing_ || (mode_ == rtl && t - changed_at_ > kReturnPause))
         z = shaped(z, {std::max(armed_z_ + (climbing_ ? height_ : kReturnHeight), climbing_ ? -1e9 : z.p), 0, 0}, along,
@@ -202,8 +207,11 @@ class ArduCopter : public Firmware {
   void watch(double t) override {
     now_ = t;
     if (lost_ != was_lost_ && armed_ && !land_complete_) {
-      if (lost_)
-        say(kCritical, "EKF variance"), say(kCritical, "EKF Failsafe: changed to LAND Mode"), change(land, true);
+      if (lost_) {
+        say(kCritical, "EKF variance");
+        say(kCritical, "EKF Failsafe: changed to LAND Mode");
+        change(land, true);
+      }
       if (!lost_) say(kCritical, "EKF Failsafe Cleared");
     }
     was_lost_ = lost_;

@@ -111,8 +111,10 @@ std::vector<Item> FaultyChannel<Item>::pass(std::optional<Item> in, double t) {
         held_.emplace_back(t + fault->delay, std::move(*in));
         break;
       case intermittent:
-        if (std::fmod(t - fault->from, fault->on + fault->off) < fault->on)
-          held_.emplace_back(t, std::move(*in)), --spoilt_;
+        if (std::fmod(t - fault->from, fault->on + fault->off) < fault->on) {
+          held_.emplace_back(t, std::move(*in));
+          --spoilt_;
+        }
     }
   } else if (in) {
     last_ = in;

@@ -140,7 +140,9 @@ void Firmware::telemetry(double t, std::vector<std::uint8_t>& out) {
   for (const auto& ack : acks_) send(ack, out);
   for (const auto& text : texts_) send(text, out);
   for (const auto& sync : syncs_) send(sync, out);
-  acks_.clear(), texts_.clear(), syncs_.clear();
+  acks_.clear();
+  texts_.clear();
+  syncs_.clear();
   for (; !asked_.empty() && asked_.front().due <= t; asked_.pop_front()) {
     const std::string& name = asked_.front().name;
     const auto type = behaviour_.integers.find(name);

@@ -212,7 +212,8 @@ int main(int argc, char** argv) {
   set_places(given);
   spdlog::set_default_logger(spdlog::stderr_logger_mt("bench"));  // standard output is for what the timeline expects
   try {
-    keep("--log", given.options.log, given.force), keep("--wire", given.options.wire, given.force);
+    keep("--log", given.options.log, given.force);
+    keep("--wire", given.options.wire, given.force);
     return finished(run(given.options, given.timeline), "backwash-bench");
   } catch (const StartError& e) {
     return failed(e.code, e.what());

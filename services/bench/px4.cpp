@@ -89,7 +89,10 @@ class Px4 : public Firmware {
     blind_ = lost();
     changed_at_ = now_;
     shaped_ = here();
-    if (mode != offboard) loops_[0].reset(), loops_[1].reset();  // brakes and swings back: px4-loss0.3.csv:221–231
+    if (mode != offboard) {
+      loops_[0].reset();
+      loops_[1].reset();
+    }  // brakes and swings back: px4-loss0.3.csv:221–231
     if (phase_ == Phase::flight) landed_state_ = mode == land && !blind_ ? landing : in_air;
   }
   bool streaming(double t) const { return since(last_setpoint_, t) < parameter("COM_OF_LOSS_T") + kLossNoticed; }
@@ -127,7 +130,11 @@ class Px4 : public Firmware {
     answer(kSetMode, taken ? kAccepted : kTemporarilyRejected);
   }
   void arm(double t) {
-    if (!armed_) armed_at_ = t, armed_z_ = believed().p_W.z(), phase_ = Phase::spooling;
+    if (!armed_) {
+      armed_at_ = t;
+      armed_z_ = believed().p_W.z();
+      phase_ = Phase::spooling;
+    }
     armed_ = true;
     vehicle_.set_motors(true);
   }
@@ -180,7 +187,8 @@ class Px4 : public Firmware {
     if (mode_ == position && failsafe_) {
       for (AxisTarget* s : {&x, &y}) *s = {s->p + s->v * kStep, s->v * std::exp(-kStep / kSinkDecay), 0};
     } else {
-      x = shaped_velocity(x, 0, limits, kStep), y = shaped_velocity(y, 0, limits, kStep);
+      x = shaped_velocity(x, 0, limits, kStep);
+      y = shaped_velocity(y, 0, limits, kStep);
     }
     const bool low = z.p - armed_z_ < kCrawlBelow && !blind_;
     const double down = mode_ == land ? (low ? kCrawlSpeed : kLandSpeed) : failsafe_ ? kSinkSpeed : 0;

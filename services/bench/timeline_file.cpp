@@ -94,7 +94,10 @@ Fault fault_of(Reader r) {
   if (f.kind == wrong && f.channel == Fault::Channel::odometry) f.yaw = r.number_or("yaw", -4, 4, 0);
   if (f.kind == slow) f.rate = r.number("rate", 1e-3, 1e7);
   if (f.kind == delayed) f.delay = r.number("delay", 0, kLongest);
-  if (f.kind == intermittent) f.on = r.number("on", 0, kLongest), f.off = r.number("off", 1e-3, kLongest);
+  if (f.kind == intermittent) {
+    f.on = r.number("on", 0, kLongest);
+    f.off = r.number("off", 1e-3, kLongest);
+  }
   r.finish();
   return f;
 }
@@ -137,7 +140,8 @@ tl::expected<Timeline, config::ConfigError> load_timeline(const std::string& pat
   try {
     const toml::table root = toml::parse_file(path);
     Reader r(path, root);
-    r.allow("fault"), r.allow("expect");
+    r.allow("fault");
+    r.allow("expect");
     Timeline t;
     if (r.has("after")) t.after_arming = r.choice("after", std::array<const char*, 2>{"start", "arming"}) == 1;
     r.finish();

@@ -117,16 +117,46 @@ Check topic() {
   return {wrong, "TOPIC"};
 }
 
-Option Option::required() { return option_->required(), *this; }
-Option Option::check(const Check& check) { return option_->check(check.wrong, check.words), *this; }
-Option Option::capture_default_str() { return option_->capture_default_str(), *this; }
-Option Option::default_str(const std::string& text) { return option_->default_str(text), *this; }
-Option Option::delimiter(char between) { return option_->delimiter(between), *this; }
-Option Option::expected(int count) { return option_->expected(count), *this; }
-Option Option::expected(int least, int most) { return option_->expected(least, most), *this; }
-Option Option::excludes(Option other) { return option_->excludes(other.option_), *this; }
-Option Option::type_name(const std::string& name) { return option_->type_name(name), *this; }
-Option Option::trigger_on_parse() { return option_->trigger_on_parse(), *this; }
+Option Option::required() {
+  option_->required();
+  return *this;
+}
+Option Option::check(const Check& check) {
+  option_->check(check.wrong, check.words);
+  return *this;
+}
+Option Option::capture_default_str() {
+  option_->capture_default_str();
+  return *this;
+}
+Option Option::default_str(const std::string& text) {
+  option_->default_str(text);
+  return *this;
+}
+Option Option::delimiter(char between) {
+  option_->delimiter(between);
+  return *this;
+}
+Option Option::expected(int count) {
+  option_->expected(count);
+  return *this;
+}
+Option Option::expected(int least, int most) {
+  option_->expected(least, most);
+  return *this;
+}
+Option Option::excludes(Option other) {
+  option_->excludes(other.option_);
+  return *this;
+}
+Option Option::type_name(const std::string& name) {
+  option_->type_name(name);
+  return *this;
+}
+Option Option::trigger_on_parse() {
+  option_->trigger_on_parse();
+  return *this;
+}
 
 Command::Command(const std::string& what, const std::string& name)
     : owned_(std::make_unique<CLI::App>(what, name)), app_(owned_.get()) {}

@@ -50,7 +50,10 @@ std::string nearest(const std::string& said, std::span<const std::string> known)
   std::string best;
   std::size_t least = (letters + 2) / 3 + 1;
   for (const auto& name : known)
-    if (const std::size_t d = distance(said, name); d < least) least = d, best = name;
+    if (const std::size_t d = distance(said, name); d < least) {
+      least = d;
+      best = name;
+    }
   return best;
 }
 

@@ -19,7 +19,8 @@ std::optional<AirSaid::Class> class_said(const std::string& text) {
   const std::size_t left = static_cast<std::size_t>(std::max(factor, caused));
   const int read = std::sscanf(text.c_str() + left, " (%lf, %lf s)%n", &said.ln_evidence, &said.seconds, &end);
   if (read != 2 || left + static_cast<std::size_t>(end) != text.size()) return std::nullopt;
-  said.name = name, said.cause = cause;
+  said.name = name;
+  said.cause = cause;
   return said;
 }
 

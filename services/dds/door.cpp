@@ -184,7 +184,10 @@ bool Door::takes(Prefix prefix, std::size_t bytes, std::int64_t now_ns) noexcept
 void Door::wants(std::span<const std::string> topics) noexcept {
   const std::lock_guard lock(mutex_);
   for (const std::string& topic : topics)
-    if (const std::size_t n = topics_known_; n < kTopics) topics_[n] = key(topic), ++topics_known_;
+    if (const std::size_t n = topics_known_; n < kTopics) {
+      topics_[n] = key(topic);
+      ++topics_known_;
+    }
   if (topics.empty() || topics_known_ == kTopics) topics_known_ = kAllTopics;
 }
 
@@ -205,7 +208,10 @@ Door::Endpoint Door::takes_endpoint(Prefix prefix, std::uint32_t entity, bool go
     if ((known.place ? known.place->until_ns.load() : known.until_ns) < now_ns) {
       free = &known;
     } else if (known.key == what) {
-      if (gone) known = {}, --place->endpoints;
+      if (gone) {
+        known = {};
+        --place->endpoints;
+      }
       return Endpoint::yes;
     }
   }

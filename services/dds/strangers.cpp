@@ -137,7 +137,10 @@ class Passage {
       if (pid == kPidParticipant) (own(value) ? own_guid : foreign) = true;
       if (pid == kPidIdentity) identity = true;
       if (pid == kPidBuiltins && value.size() == 4) secure = read32(value.data(), said.little) & kSecureBuiltins;
-      if (pid == kPidLease && value.size() == 8) lease = true, cut(value, said.little);
+      if (pid == kPidLease && value.size() == 8) {
+        lease = true;
+        cut(value, said.little);
+      }
       if (pid == kPidVersion && value.size() >= 8)
         value[said.little ? 4 : 7] &= static_cast<std::uint8_t>(~kOfAllOthers);
     });

@@ -29,7 +29,8 @@ namespace {
         const ssize_t n = ::write(out, bytes, count);
         if (n < 0 && errno == EINTR) continue;
         if (n < 0) ::_exit(1);
-        bytes += n, count -= static_cast<std::size_t>(n);
+        bytes += n;
+        count -= static_cast<std::size_t>(n);
       }
     });
   } catch (...) {

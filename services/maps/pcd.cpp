@@ -105,9 +105,10 @@ std::string read_header(std::string_view& rest, Header& header) {
       keys[2] = first;
     else if (key == "VIEWPOINT")
       for (const auto& word : words) header.viewpoint += word + " ";
-    else if (key == "DATA")
-      header.data = first.empty() ? "?" : first, wrong = "";
-    else
+    else if (key == "DATA") {
+      header.data = first.empty() ? "?" : first;
+      wrong = "";
+    } else
       return std::to_string(header.lines) + ": " + shown(key) + " is no line of a PCD header; the first is '# .PCD …'";
   }
   if (wrong.empty()) wrong = take_types(types, sizes, header);

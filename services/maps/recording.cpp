@@ -218,7 +218,10 @@ class Recording {
     const auto frame = tree_.pose(cloud.frame, cloud.stamp_ns);
     const bool knows = !seer.empty() && tree_.root_of(seer) == root;
     const auto sensor = knows ? tree_.pose(seer, cloud.stamp_ns) : std::nullopt;
-    if (!frame || (knows && !sensor)) return ++left_out_, "";
+    if (!frame || (knows && !sensor)) {
+      ++left_out_;
+      return "";
+    }
     rays_ = rays_ && knows;
     out_.single = out_.single || (cloud.single && !moved);
     for (std::size_t n = cloud.first; n < cloud.first + cloud.count; ++n) {

@@ -27,7 +27,8 @@ bool of_lz4(std::string_view packed, std::string& bytes) {
     std::size_t out = bytes.size() - done, in = packed.size();
     left = LZ4F_decompress(context.get(), bytes.data() + done, &out, packed.data(), &in, nullptr);
     if (LZ4F_isError(left) || (in == 0 && out == 0)) return false;
-    done += out, packed.remove_prefix(in);
+    done += out;
+    packed.remove_prefix(in);
   }
   return left == 0 && done == bytes.size();
 }

@@ -64,7 +64,8 @@ TEST(Bets, AFactorIsRefutedOnlyBelowWhatTheSquaresHold) {
         for (int axis = 0; axis < 3; ++axis) i.square[axis] = v * std::pow(normal(rng), 2);
         bets.add(i);
       }
-      wrong += bets.above().value_or(0) > v, near += bets.above().value_or(0) > 0.7 * v;
+      wrong += bets.above().value_or(0) > v;
+      near += bets.above().value_or(0) > 0.7 * v;
     }
     EXPECT_LE(wrong, 1) << v;
     EXPECT_GE(near, 57) << v;
@@ -84,7 +85,8 @@ TEST(Bets, CalmerAirIsSaidAfterAMinuteAndNeverTooCalm) {
       bets.add(i);
       early += bets.seconds() < kLeastCalm && bets.below();
     }
-    too_calm += bets.below().value_or(1) < 0.4, near += bets.below().value_or(1) < 0.75;
+    too_calm += bets.below().value_or(1) < 0.4;
+    near += bets.below().value_or(1) < 0.75;
     EXPECT_FALSE(bets.above());
   }
   EXPECT_EQ(early, 0);
@@ -96,7 +98,8 @@ TEST(Bets, NoiseAndPushAreGrantedToTheRougherSideAlone) {
   Bets granted, calm;
   for (int k = 0; k < 2000; ++k) {
     auto i = of_square(1.8);
-    i.noise = Vec3::Constant(0.5), i.granted = Vec3::Constant(0.5);
+    i.noise = Vec3::Constant(0.5);
+    i.granted = Vec3::Constant(0.5);
     granted.add(i);
     i.square = Vec3::Constant(0.9);
     calm.add(i);

@@ -53,7 +53,8 @@ TEST(CalmInFlight, FactorsFallAtRestAloneAfterAMinuteAndNotBelowWhatIsConfigured
 
 TEST(CalmInFlight, OfAirWithoutAClassNothingIsShrunk) {
   GustyFlight flight(4, may_shrink());
-  flight.factor() = 0.1, flight.place = AirClass::none;
+  flight.factor() = 0.1;
+  flight.place = AirClass::none;
   rest(flight);
   flight.fly(200);
   EXPECT_EQ(flight.learnt.factors(), kModelledAir);
@@ -79,7 +80,8 @@ TEST(CalmInFlight, CalmAirIsShownThroughTheNoiseOfAPositionThatIsSmall) {
     double sum = 0;
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
       gusts::Trial trial;
-      trial.position_noise = noise, trial.velocity_noise = 0.05;
+      trial.position_noise = noise;
+      trial.velocity_noise = 0.05;
       GustyFlight flight(seed, may_shrink(), trial);
       flight.factor() = 0.2;
       rest(flight);

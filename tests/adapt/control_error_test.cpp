@@ -38,7 +38,8 @@ TEST(ControlError, OfALoopAsTheFileSaysItHasTheVarianceThatWasPromisedWhateverTh
   for (const auto& controller : {gusts::quad_5in(), late, gusts::px4()})
     for (const gusts::Form form : gusts::kForms) {
       gusts::Trial trial;
-      trial.form = form, trial.seconds = 1500;
+      trial.form = form;
+      trial.seconds = 1500;
       EXPECT_NEAR(mean_square(samples(controller, trial)), 1, 0.12)
           << controller.kp.horizontal << ", form " << static_cast<int>(form);
     }
@@ -51,8 +52,10 @@ TEST(ControlError, OneSampleTellsLittleOfTheNext) {
     const auto all = samples(controller, trial);
     ASSERT_GT(all.size(), 500u);
     double with_next = 0, squares = 0;
-    for (std::size_t k = 1; k < all.size(); ++k)
-      with_next += all[k].e_W.dot(all[k - 1].e_W), squares += all[k].e_W.squaredNorm();
+    for (std::size_t k = 1; k < all.size(); ++k) {
+      with_next += all[k].e_W.dot(all[k - 1].e_W);
+      squares += all[k].e_W.squaredNorm();
+    }
     EXPECT_LT(std::abs(with_next / squares), ControlError::kForgotten + 0.03);
   }
 }
@@ -60,13 +63,17 @@ TEST(ControlError, OneSampleTellsLittleOfTheNext) {
 TEST(ControlError, NeitherNoiseNorVibrationNorTheRateOfTheOdometryIsAnError) {
   for (const double rate : {50.0, 30.0, 16.7}) {
     gusts::Trial trial;
-    trial.seconds = 1000, trial.rate_hz = rate, trial.position_noise = 0.004, trial.velocity_noise = 0.05;
+    trial.seconds = 1000;
+    trial.rate_hz = rate;
+    trial.position_noise = 0.004;
+    trial.velocity_noise = 0.05;
     const auto noisy = samples(gusts::quad_5in(), trial);
     EXPECT_NEAR(mean_square(noisy), 1, 0.12) << rate;
     EXPECT_NEAR(std::sqrt(noisy.back().noise.x()), 0.004, 0.0006) << rate;
   }
   gusts::Trial trial;
-  trial.seconds = 1000, trial.vibration = 0.004;
+  trial.seconds = 1000;
+  trial.vibration = 0.004;
   EXPECT_LT(mean_square(samples(gusts::quad_5in(), trial)), 1.1);
 }
 
@@ -82,7 +89,8 @@ TEST(ControlError, AnOdometryThatIsLateIsHeldAgainstItsOwnTime) {
     ticks.push_back(loop.tick());
     if (ticks.size() < 4) continue;
     AirTick tick = ticks.back();
-    tick.state = ticks[ticks.size() - 4].state, tick.age_s = 0.06;
+    tick.state = ticks[ticks.size() - 4].state;
+    tick.age_s = 0.06;
     if (const auto sample = error.add(tick)) all.push_back(*sample);
   }
   EXPECT_NEAR(mean_square(all), 1, 0.2);
@@ -143,7 +151,10 @@ TEST(Remainder, IsWhatNeitherAConstantNorTheCommandedMotionExplains) {
     return mean_square(all);
   };
   gusts::Trial load, push, delay, late;
-  load.load = 0.05, push.push = 0.5, delay.delay = 0.1, late.command_delay = 0.1;
+  load.load = 0.05;
+  push.push = 0.5;
+  delay.delay = 0.1;
+  late.command_delay = 0.1;
   for (const auto& trial : {load, push}) {
     EXPECT_GT(mean_square(samples(gusts::quad_5in(), trial)), 10);
     EXPECT_LT(left(trial, false), 1.5);

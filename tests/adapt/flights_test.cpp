@@ -56,13 +56,16 @@ TEST(AdaptFlights, RougherAirIsFoundAndSaidToBeTheAir) {
   }
   trial.since_s = 60;
   EXPECT_LT(middle(trial, 20), 15);
-  trial.factor = 16, trial.since_s = 0;
+  trial.factor = 16;
+  trial.since_s = 0;
   for (const auto& learned : fly_many(trial, 10)) EXPECT_GT(learned.factor, 9.5);
 }
 
 TEST(AdaptFlights, WhatIsRoughNearWallsIsToldOfWallsAlone) {
   Trial trial;
-  trial.factor = 6, trial.walls_only = true, trial.seconds = 180;
+  trial.factor = 6;
+  trial.walls_only = true;
+  trial.seconds = 180;
   for (const auto& learned : fly_many(trial, 10)) {
     EXPECT_GT(learned.factor, 1.1);
     EXPECT_LT(learned.factor, 6.01);
@@ -78,12 +81,18 @@ TEST(AdaptFlights, WhatIsNotTheAirIsNotCalledTheAirAndOutlivesNoFlight) {
     Cause cause;
   };
   std::vector<Fault> faults(6);
-  faults[0] = {"load", {}, Cause::constant}, faults[0].trial.load = 0.05;
-  faults[1] = {"push", {}, Cause::constant}, faults[1].trial.push = 0.5;
-  faults[2] = {"late measurements", {}, Cause::motion}, faults[2].trial.delay = 0.1;
-  faults[3] = {"late set-points", {}, Cause::motion}, faults[3].trial.command_delay = 0.1;
-  faults[4] = {"lag", {}, Cause::motion}, faults[4].trial.lag = 0.15;
-  faults[5] = {"vibration", {}, Cause::none}, faults[5].trial.vibration = 0.003;
+  faults[0] = {"load", {}, Cause::constant};
+  faults[0].trial.load = 0.05;
+  faults[1] = {"push", {}, Cause::constant};
+  faults[1].trial.push = 0.5;
+  faults[2] = {"late measurements", {}, Cause::motion};
+  faults[2].trial.delay = 0.1;
+  faults[3] = {"late set-points", {}, Cause::motion};
+  faults[3].trial.command_delay = 0.1;
+  faults[4] = {"lag", {}, Cause::motion};
+  faults[4].trial.lag = 0.15;
+  faults[5] = {"vibration", {}, Cause::none};
+  faults[5].trial.vibration = 0.003;
   for (const auto& fault : faults)
     for (const auto& controller : {quad_5in(), px4()}) {
       int said = 0;
@@ -98,7 +107,8 @@ TEST(AdaptFlights, WhatIsNotTheAirIsNotCalledTheAirAndOutlivesNoFlight) {
 
 TEST(AdaptFlights, WhereNothingIsCommandedItCannotTellWhy) {
   Trial trial;
-  trial.factor = 4, trial.speed = 0;
+  trial.factor = 4;
+  trial.speed = 0;
   for (const auto& learned : fly_many(trial, 10)) {
     EXPECT_EQ(learned.cause, Cause::unknown);
     EXPECT_GT(learned.factor, 1.9) << "sets grow all the same";
@@ -118,7 +128,10 @@ TEST(AdaptFlights, ShorterGustsThanCalibratedAreNeverRougherAndCalmerOfOneClass)
 TEST(AdaptFlights, CountsErrorsBeyondALevelBesideWhatWasPromised) {
   double beyond = 0, promised = 0;
   Trial trial;
-  for (const auto& learned : fly_many(trial, 40)) beyond += learned.beyond, promised += learned.promised;
+  for (const auto& learned : fly_many(trial, 40)) {
+    beyond += learned.beyond;
+    promised += learned.promised;
+  }
   EXPECT_NEAR(beyond / promised, 1, 0.25);
   trial.factor = 4;
   for (const auto& learned : fly_many(trial, 3)) EXPECT_GT(learned.beyond, 5 * learned.promised);

@@ -19,7 +19,9 @@ TEST(InFlight, NeitherNoiseNorRateMakeItRougherNorHideIt) {
        {std::tuple{50.0, 0.0, 0.05}, {50.0, 0.005, 0.05}, {30.0, 0.002, 0.02}, {16.7, 0.005, 0.05}})
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
       gusts::Trial trial;
-      trial.rate_hz = rate, trial.position_noise = position, trial.velocity_noise = velocity;
+      trial.rate_hz = rate;
+      trial.position_noise = position;
+      trial.velocity_noise = velocity;
       GustyFlight calm(seed, constants(), trial), rough(seed, constants(), trial);
       told += calm.fly(60).bets().above().has_value();
       rough.factor() = 6;
@@ -41,7 +43,8 @@ TEST(InFlight, WhatIsToldIsBelowWhatBlows) {
 
 TEST(InFlight, AClassThatIsNotKnownLearnsForAll) {
   GustyFlight flight(3);
-  flight.place = AirClass::none, flight.factor() = 4;
+  flight.place = AirClass::none;
+  flight.factor() = 4;
   flight.fly(40);
   EXPECT_EQ(flight.wall(), 1);
   EXPECT_GT(flight.learnt.factors()[static_cast<std::size_t>(AirClass::none)], 1);
@@ -94,11 +97,16 @@ TEST(InFlight, AClockThatIsSetAFrameThatMovesAndAGapAreNoRoughAir) {
     flight.spoil = [&](AirTick& tick) {
       if (++n % 400 == 0)
         fault == 0 ? void(shift -= 7'000'000'000) : fault == 1 ? void(++frame) : void(shift += 400'000'000);
-      tick.now_ns += shift, tick.frame = frame;
+      tick.now_ns += shift;
+      tick.frame = frame;
       // The frame turns with it.
-      if (frame % 2 == 1)
-        tick.state.v_W.x() *= -1, tick.state.p_W.x() *= -1, tick.command.p_W.x() *= -1, tick.command.v_W.x() *= -1,
-            tick.command.a_W.x() *= -1;
+      if (frame % 2 == 1) {
+        tick.state.v_W.x() *= -1;
+        tick.state.p_W.x() *= -1;
+        tick.command.p_W.x() *= -1;
+        tick.command.v_W.x() *= -1;
+        tick.command.a_W.x() *= -1;
+      }
     };
     EXPECT_EQ(flight.fly(60).rises, 0) << fault;
     flight.factor() = 6;
@@ -110,7 +118,8 @@ TEST(InFlight, AClockThatIsSetAFrameThatMovesAndAGapAreNoRoughAir) {
 TEST(InFlight, OfTwoWithEqualTicksEveryNumberIsEqual) {
   GustyFlight a(7), b(7);
   a.factor() = b.factor() = 4;
-  a.fly(30), b.fly(30);
+  a.fly(30);
+  b.fly(30);
   EXPECT_EQ(a.learnt.factors(), b.learnt.factors());
   EXPECT_EQ(a.bets().ln_evidence(), b.bets().ln_evidence());
 }
@@ -134,7 +143,8 @@ TEST(InFlight, FrozenFactorsStayAndThawedOnesAreThoseOfAFlightThatWasNeverFrozen
   GustyFlight free(8), frozen(8);
   free.factor() = frozen.factor() = 6;
   EXPECT_FALSE(frozen.learnt.carry_out(AirOrder::freeze));
-  free.fly(30), frozen.fly(30);
+  free.fly(30);
+  frozen.fly(30);
   ASSERT_GT(free.wall(), 1);
   EXPECT_EQ(frozen.learnt.factors(), kModelledAir);
   EXPECT_EQ(frozen.bets().ln_evidence(), free.bets().ln_evidence());

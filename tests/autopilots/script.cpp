@@ -18,7 +18,10 @@ namespace {
 int play(const std::string& device, const std::string& truth_at, const std::string& trace_path, int pid,
          Session::Options options) {
   bool stopped = false;  // then its simulator answers nobody, and the time must go on
-  options.stopped = [&](bool stop) { stopped = stop, ::kill(pid, stop ? SIGSTOP : SIGCONT); };
+  options.stopped = [&](bool stop) {
+    stopped = stop;
+    ::kill(pid, stop ? SIGSTOP : SIGCONT);
+  };
   std::ofstream trace(trace_path);
   Session session(open_line(device), options, trace);
   const auto truth = truth_source(truth_at);

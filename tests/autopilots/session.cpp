@@ -131,16 +131,23 @@ void Session::forward(const Truth& truth) {
   const Eigen::Quaterniond q = mavlink::swap_ned_frd(truth.q_EB);
   mavlink::Odometry m;
   m.time_usec = static_cast<std::uint64_t>(truth.at_ns / 1000);
-  m.x = float(p.x()), m.y = float(p.y()), m.z = float(p.z());
+  m.x = float(p.x());
+  m.y = float(p.y());
+  m.z = float(p.z());
   m.q = {float(q.w()), float(q.x()), float(q.y()), float(q.z())};
-  m.vx = float(v.x()), m.vy = float(v.y()), m.vz = float(v.z());
+  m.vx = float(v.x());
+  m.vy = float(v.y());
+  m.vz = float(v.z());
   m.rollspeed = m.pitchspeed = m.yawspeed = std::numeric_limits<float>::quiet_NaN();
   constexpr std::array<std::size_t, 6> kDiagonal{0, 6, 11, 15, 18, 20};
   for (int i = 0; i < 3; ++i) {
     m.pose_covariance[kDiagonal[i]] = m.velocity_covariance[kDiagonal[i]] = 1e-4F;
     m.pose_covariance[kDiagonal[i + 3]] = m.velocity_covariance[kDiagonal[i + 3]] = 1e-4F;
   }
-  m.frame_id = kLocalFrd, m.child_frame_id = kBodyFrd, m.estimator_type = kVio, m.quality = 100;
+  m.frame_id = kLocalFrd;
+  m.child_frame_id = kBodyFrd;
+  m.estimator_type = kVio;
+  m.quality = 100;
   peer_.send(m);
 }
 

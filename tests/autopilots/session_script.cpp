@@ -31,7 +31,10 @@ bool Session::advance() {
 }
 
 void Session::wait(std::function<bool()> done, double at_most, bool must) {
-  busy_ = true, must_ = must, done_ = std::move(done), until_ = t_ + at_most;
+  busy_ = true;
+  must_ = must;
+  done_ = std::move(done);
+  until_ = t_ + at_most;
 }
 
 void Session::begin(std::istringstream& in) {
@@ -66,7 +69,9 @@ void Session::begin(std::istringstream& in) {
     const double at_most = number();
     const auto id = static_cast<std::uint16_t>(number());
     mavlink::CommandLong m{0, 0, 0, 0, 0, 0, 0, id, kSystem, kFlightController, 0};
-    m.param1 = float(number()), m.param2 = float(number()), m.param3 = float(number());
+    m.param1 = float(number());
+    m.param2 = float(number());
+    m.param3 = float(number());
     acks_.erase(id);
     wait(
         [this, m, id] {

@@ -45,7 +45,10 @@ class ArduPilotTruth : public TruthSource {
     t.v_E = mavlink::swap_ned({m.vn, m.ve, m.vd});
     t.q_EB = mavlink::swap_ned_frd(Eigen::Quaterniond(m.q1, m.q2, m.q3, m.q4).normalized());
     t.omega_B = mavlink::swap_frd({m.xgyro, m.ygyro, m.zgyro});
-    if (!first_) first_ = m, last_ = t;
+    if (!first_) {
+      first_ = m;
+      last_ = t;
+    }
     const double north = (m.lat_int - first_->lat_int) * kMetresPerStep;
     const double east =
         (m.lon_int - first_->lon_int) * kMetresPerStep * std::cos(first_->lat_int * 1e-7 * 3.14159265358979 / 180);

@@ -169,7 +169,10 @@ class Vio {
     double nearest = distance_.exact(grid_, p.p);
     if (crate_) nearest = std::min(nearest, crate_->distance(p.p));
     const double clearance = nearest - vehicle_.body.radius;
-    if (clearance < closest_) closest_ = clearance, closest_at_ = p.p;
+    if (clearance < closest_) {
+      closest_ = clearance;
+      closest_at_ = p.p;
+    }
     const bool contact = clearance < 0;
     contacts_ += contact && !touching_;
     touching_ = contact;

@@ -30,9 +30,12 @@ std::vector<AirTick> flown() {
   std::vector<AirTick> ticks(kTicks);
   for (int k = 0; k < kTicks; ++k) {
     AirTick& tick = ticks[static_cast<std::size_t>(k)];
-    tick.now_ns = 20'000'000LL * k, tick.age_s = 0.01, tick.air = AirClass::wall;
+    tick.now_ns = 20'000'000LL * k;
+    tick.age_s = 0.01;
+    tick.air = AirClass::wall;
     tick.sigma = Vec3(0.01, 0.02, 0.01);
-    tick.command.p_W.x() = std::sin(0.01 * k), tick.command.v_W.x() = 0.5 * std::cos(0.01 * k);
+    tick.command.p_W.x() = std::sin(0.01 * k);
+    tick.command.v_W.x() = 0.5 * std::cos(0.01 * k);
     tick.state.p_W = tick.command.p_W + 0.01 * Vec3(normal(rng), normal(rng), normal(rng));
     tick.state.v_W = tick.command.v_W;
   }
@@ -122,9 +125,11 @@ void spread(double feedback_delay) {
       const double before = now();
       benchmark::DoNotOptimize(air.add(tick));
       const double after = now();
-      ns.push_back(after - before), empty.push_back(now() - after);
+      ns.push_back(after - before);
+      empty.push_back(now() - after);
     }
-  std::ranges::sort(ns), std::ranges::sort(empty);
+  std::ranges::sort(ns);
+  std::ranges::sort(empty);
   const auto at = [](const std::vector<double>& x, double share) {
     return x[static_cast<std::size_t>(share * static_cast<double>(x.size()))];
   };

@@ -79,7 +79,8 @@ void change_of_one_cubic_metre(benchmark::State& state) {
       set(cell);
       const auto begun = std::clock();
       field.update(grid, changed);
-      updates_s += seconds_since(begun), ++updates;
+      updates_s += seconds_since(begun);
+      ++updates;
       const auto anew_begun = std::clock();
       const DistanceField anew(grid);
       whole_s += seconds_since(anew_begun);

@@ -30,7 +30,8 @@ void cost_of_set(benchmark::State& state, const std::string& map) {
     const auto all = test::cost_of_set(*world);
     const auto between = std::clock();
     const auto found = plan::cost_of_set(*world);
-    bounded += std::clock() - between, looked_for += between - begun;
+    bounded += std::clock() - between;
+    looked_for += between - begun;
     same = same && all.safe_at_centre == found.safe_at_centre && all.lost == found.lost &&
            std::abs(all.median_m - found.median_m) < 1e-12 && std::abs(all.quantile95_m - found.quantile95_m) < 1e-12;
   }

@@ -139,8 +139,10 @@ void whole_field_turned(benchmark::State& state) {
   const OccupancyGrid straight = bench::furnished_room(0.1);
   const OccupancyGrid turned = bench::turned_room(0.1, static_cast<double>(state.range(0)) * std::numbers::pi / 180);
   double of_straight = 1e9, of_turned = 1e9;  // the least of all: other load only adds
-  for (auto _ : state)
-    of_straight = std::min(of_straight, evaluate(straight)), of_turned = std::min(of_turned, evaluate(turned));
+  for (auto _ : state) {
+    of_straight = std::min(of_straight, evaluate(straight));
+    of_turned = std::min(of_turned, evaluate(turned));
+  }
   state.counters["of_straight"] = of_turned / of_straight;
 }
 BENCHMARK(whole_field_turned)->Arg(0)->Arg(7)->Arg(23)->Arg(45)->Iterations(7)->Unit(benchmark::kMillisecond);
@@ -200,9 +202,12 @@ void two_threads(benchmark::State& state) {
       const double start = clock();
       stored.fill(whole, n, n + 1);
       const double took = clock() - start;
-      *std::ranges::min_element(busy) += took, most = std::max(most, took);
+      *std::ranges::min_element(busy) += took;
+      most = std::max(most, took);
     }
-    one_by_one += busy[0] + busy[1], longer += std::max(busy[0], busy[1]), longest += most;
+    one_by_one += busy[0] + busy[1];
+    longer += std::max(busy[0], busy[1]);
+    longest += most;
   }
   state.counters["factor"] = (prepared + at_once) / (prepared + longer);
   state.counters["work"] = one_by_one / at_once;
@@ -233,7 +238,10 @@ void interpolation(benchmark::State& state) {
       const double scale = std::max({t.xx, t.yy, t.zz});
       const double off =
           std::max({std::abs(s.xx - t.xx), std::abs(s.xy - t.xy), std::abs(s.yy - t.yy), std::abs(s.zz - t.zz)});
-      if (off / scale > largest) largest = off / scale, where = p;
+      if (off / scale > largest) {
+        largest = off / scale;
+        where = p;
+      }
       deviations.push_back(off / scale);
     }
   std::ranges::sort(deviations);
@@ -241,7 +249,9 @@ void interpolation(benchmark::State& state) {
   state.counters["median"] = deviations[deviations.size() / 2];
   state.counters["p99"] = deviations[deviations.size() * 99 / 100];
   state.counters["largest"] = largest;
-  state.counters["x"] = where.x(), state.counters["y"] = where.y(), state.counters["z"] = where.z();
+  state.counters["x"] = where.x();
+  state.counters["y"] = where.y();
+  state.counters["z"] = where.z();
 }
 BENCHMARK(interpolation)->Arg(0)->Arg(180)->Iterations(1)->Unit(benchmark::kMillisecond);
 

@@ -124,16 +124,25 @@ struct Tally {
 
 void report(benchmark::State& state, const Tally& t, double kernel) {
   auto& c = state.counters;
-  c["search_p50"] = quantile(t.search, 0.5), c["search_p95"] = quantile(t.search, 0.95);
-  c["total_p50"] = quantile(t.total, 0.5), c["total_p95"] = quantile(t.total, 0.95);
-  c["total_max"] = quantile(t.total, 1), c["verify_p50"] = quantile(t.verify, 0.5);
-  c["kernel"] = kernel, c["search/kernel"] = quantile(t.search, 0.5) / kernel;
+  c["search_p50"] = quantile(t.search, 0.5);
+  c["search_p95"] = quantile(t.search, 0.95);
+  c["total_p50"] = quantile(t.total, 0.5);
+  c["total_p95"] = quantile(t.total, 0.95);
+  c["total_max"] = quantile(t.total, 1);
+  c["verify_p50"] = quantile(t.verify, 0.5);
+  c["kernel"] = kernel;
+  c["search/kernel"] = quantile(t.search, 0.5) / kernel;
   c["total/kernel"] = quantile(t.total, 0.5) / kernel;
-  c["expanded_p50"] = quantile(t.expanded, 0.5), c["expanded_p95"] = quantile(t.expanded, 0.95);
-  c["evaluations_p50"] = quantile(t.evaluations, 0.5), c["evaluations_p95"] = quantile(t.evaluations, 0.95);
-  c["length_p50"] = quantile(t.length, 0.5), c["jerk2"] = t.jerk2;
-  c["queries"] = static_cast<double>(t.total.size()), c["ok"] = t.ok;
-  c["collisions"] = t.collisions, c["violations"] = t.violations;
+  c["expanded_p50"] = quantile(t.expanded, 0.5);
+  c["expanded_p95"] = quantile(t.expanded, 0.95);
+  c["evaluations_p50"] = quantile(t.evaluations, 0.5);
+  c["evaluations_p95"] = quantile(t.evaluations, 0.95);
+  c["length_p50"] = quantile(t.length, 0.5);
+  c["jerk2"] = t.jerk2;
+  c["queries"] = static_cast<double>(t.total.size());
+  c["ok"] = t.ok;
+  c["collisions"] = t.collisions;
+  c["violations"] = t.violations;
 }
 
 plan::PlanStart at_rest(const Vec3& p_W) { return {{p_W, Vec3::Zero()}, {p_W, Vec3::Zero(), Vec3::Zero(), 0}}; }
@@ -161,13 +170,16 @@ Tally planned(const plan::World& world, const std::vector<Query>& queries, const
       const double begun = cpu_ms();
       p = plan::plan(world, at_rest(q.start), q.goal, options);
       total.push_back(cpu_ms() - begun);
-      search.push_back(search_ms(world, q)), verify.push_back(p.metrics.verify_ms);
+      search.push_back(search_ms(world, q));
+      verify.push_back(p.metrics.verify_ms);
     }
-    tally.search.push_back(quantile(search, 0.5)), tally.total.push_back(quantile(total, 0.5));
+    tally.search.push_back(quantile(search, 0.5));
+    tally.total.push_back(quantile(total, 0.5));
     tally.verify.push_back(quantile(verify, 0.5));
     tally.expanded.push_back(static_cast<double>(p.metrics.expanded));
     tally.evaluations.push_back(static_cast<double>(p.metrics.evaluations));
-    tally.length.push_back(p.metrics.length_m), tally.jerk2 += p.metrics.jerk2;
+    tally.length.push_back(p.metrics.length_m);
+    tally.jerk2 += p.metrics.jerk2;
     if (p.status != plan::PlanStatus::ok) {
       refusal = "last refusal: " + p.message;
       continue;
@@ -208,10 +220,13 @@ void search_tail(benchmark::State& state) {
       ms.push_back(cpu_ms() - begun);
       if (found) of_bound.push_back(found->cost / found->lower_bound);
     }
-  state.counters["p50"] = quantile(ms, 0.5), state.counters["p95"] = quantile(ms, 0.95);
-  state.counters["p99"] = quantile(ms, 0.99), state.counters["max"] = quantile(ms, 1);
+  state.counters["p50"] = quantile(ms, 0.5);
+  state.counters["p95"] = quantile(ms, 0.95);
+  state.counters["p99"] = quantile(ms, 0.99);
+  state.counters["max"] = quantile(ms, 1);
   state.counters["found"] = static_cast<double>(of_bound.size());
-  state.counters["cost/bound_p50"] = quantile(of_bound, 0.5), state.counters["cost/bound_max"] = quantile(of_bound, 1);
+  state.counters["cost/bound_p50"] = quantile(of_bound, 0.5);
+  state.counters["cost/bound_max"] = quantile(of_bound, 1);
 }
 BENCHMARK(search_tail)->Arg(1500)->Arg(500)->Arg(3000)->Unit(benchmark::kMillisecond)->Iterations(1);
 
@@ -230,11 +245,14 @@ void success(benchmark::State& state, const std::string& scene) {
         wrong += p.status != plan::PlanStatus::no_path;
         continue;
       }
-      exists += 1, found += p.status == plan::PlanStatus::ok;
+      exists += 1;
+      found += p.status == plan::PlanStatus::ok;
       if (p.status != plan::PlanStatus::ok) state.SetLabel(std::string(plan::to_string(p.status)) + ": " + p.message);
     }
   }
-  state.counters["exists"] = exists, state.counters["found"] = found, state.counters["wrong"] = wrong;
+  state.counters["exists"] = exists;
+  state.counters["found"] = found;
+  state.counters["wrong"] = wrong;
   state.counters["share"] = found / exists;
 }
 BENCHMARK_CAPTURE(success, apartment, "apartment")->Arg(1000)->Unit(benchmark::kMillisecond)->Iterations(1);
@@ -255,7 +273,8 @@ void set_extent(benchmark::State& state) {
         ratio.push_back(Vec3(h[kX], h[kY], h[kZ]).norm() / (w.distance.exact(w.grid, step.center.p_W) - prism));
       }
     }
-  state.counters["norm/prism_p5"] = quantile(ratio, 0.05), state.counters["norm/prism_p50"] = quantile(ratio, 0.5);
+  state.counters["norm/prism_p5"] = quantile(ratio, 0.05);
+  state.counters["norm/prism_p50"] = quantile(ratio, 0.5);
   state.counters["norm/prism_p95"] = quantile(ratio, 0.95);
 }
 BENCHMARK(set_extent)->Unit(benchmark::kMillisecond)->Iterations(1);

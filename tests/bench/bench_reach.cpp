@@ -105,7 +105,10 @@ void dense(benchmark::State& state, bool literal) {
   const Vehicle v = vehicle();
   DensePaper paper(v, literal);
   EllipsoidRecursion reference(v);
-  for (int k = 0; k < 50; ++k) paper.step(channels(bounds()[0])), reference.step(channels(bounds()[0]));
+  for (int k = 0; k < 50; ++k) {
+    paper.step(channels(bounds()[0]));
+    reference.step(channels(bounds()[0]));
+  }
   if ((paper.Q() - reference.Q()).norm() > 1e-9 * reference.Q().norm()) {
     state.SkipWithError("the dense step differs from EllipsoidRecursion");
     return;
@@ -153,7 +156,10 @@ std::vector<Setpoint> flight(const plan::World& w) {
     const Vec3 p = w.grid.center(w.grid.voxel(n));
     double least = 1e9;
     for (double s = 0; s <= 2.0; s += 0.1) least = std::min(least, w.distance.interpolated(p + s * Vec3::UnitX()));
-    if (least > roomiest) roomiest = least, from = p;
+    if (least > roomiest) {
+      roomiest = least;
+      from = p;
+    }
   }
   std::vector<Setpoint> commands;
   for (double k = 0; k < kPlan; ++k) commands.push_back({from + k * kControlPeriod * Vec3::UnitX(), Vec3::UnitX()});

@@ -24,9 +24,12 @@ map::OccupancyGrid furnished_room() {
       for (int j = std::max(0, from.y()); j < std::min(100, to.y()); ++j)
         for (int i = std::max(0, from.x()); i < std::min(100, to.x()); ++i) grid.set({i, j, k}, map::Cell::occupied);
   };
-  box({0, 0, 0}, {100, 100, 1}), box({0, 0, 29}, {100, 100, 30});
-  box({0, 0, 0}, {1, 100, 30}), box({99, 0, 0}, {100, 100, 30});
-  box({0, 0, 0}, {100, 1, 30}), box({0, 99, 0}, {100, 100, 30});
+  box({0, 0, 0}, {100, 100, 1});
+  box({0, 0, 29}, {100, 100, 30});
+  box({0, 0, 0}, {1, 100, 30});
+  box({99, 0, 0}, {100, 100, 30});
+  box({0, 0, 0}, {100, 1, 30});
+  box({0, 99, 0}, {100, 100, 30});
   std::mt19937 random(1);
   const auto draw = [&](int low, int high) { return std::uniform_int_distribution(low, high)(random); };
   for (int n = 0; n < 25; ++n) {
@@ -66,7 +69,8 @@ map::OccupancyGrid office() {
   };
   for (int x = 0; x < 1000; x += 62) box({x, 0, 0}, {x + 2, 600, 50});
   for (int y = 0; y < 600; y += 86) {  // a room, a wall, a corridor, a wall
-    box({0, y, 0}, {1000, y + 2, 50}), box({0, y + 60, 0}, {1000, y + 62, 50});
+    box({0, y, 0}, {1000, y + 2, 50});
+    box({0, y + 60, 0}, {1000, y + 62, 50});
     box({0, y + 62, 1}, {1000, y + 86, 49}, map::Cell::free);
     for (int x = 0; x < 1000; x += 62) {
       box({x + 25, y + 60, 1}, {x + 34, y + 62, 21}, map::Cell::free);  // doors to the corridor on both sides
@@ -74,9 +78,12 @@ map::OccupancyGrid office() {
       box({x + 12, y + 20, 1}, {x + 20, y + 36, 8});  // a table
     }
   }
-  box({0, 0, 0}, {1000, 600, 1}), box({0, 0, 49}, {1000, 600, 50});
-  box({0, 0, 0}, {1, 600, 50}), box({999, 0, 0}, {1000, 600, 50});
-  box({0, 0, 0}, {1000, 1, 50}), box({0, 599, 0}, {1000, 600, 50});
+  box({0, 0, 0}, {1000, 600, 1});
+  box({0, 0, 49}, {1000, 600, 50});
+  box({0, 0, 0}, {1, 600, 50});
+  box({999, 0, 0}, {1000, 600, 50});
+  box({0, 0, 0}, {1000, 1, 50});
+  box({0, 599, 0}, {1000, 600, 50});
   return grid;
 }
 

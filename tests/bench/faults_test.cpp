@@ -84,7 +84,8 @@ TEST(FaultyChannel, ASlowLinkKeepsEveryByte) {
 }
 TEST(FaultyChannel, IntermittentPassesItsShare) {
   Fault f = fault(intermittent);
-  f.on = 0.1, f.off = 0.3;
+  f.on = 0.1;
+  f.off = 0.3;
   EXPECT_EQ(count(stamps(f), 100, 200), 30);
 }
 TEST(FaultyChannel, AWrongLinkFlipsOneBitAndGarbageIsNoise) {

@@ -48,7 +48,8 @@ Trace::Maybe Trace::crosses(std::size_t column, double value, double after, bool
     if (rows_[i].t <= after) continue;
     const double next = sign * (rows_[i].values[column] - value);
     if (x < 0 && next >= 0) return t - x / (next - x) * (rows_[i].t - t);
-    t = rows_[i].t, x = next;
+    t = rows_[i].t;
+    x = next;
   }
   return std::nullopt;
 }

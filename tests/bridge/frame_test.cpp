@@ -34,7 +34,9 @@ Bytes heartbeat_v1(std::uint8_t sequence) {
 /// GPS_RAW_INT, which the codec does not know: 30 bytes that hold start bytes of both versions.
 Bytes unknown_message(std::uint8_t sequence) {
   Bytes payload(30, 0x11);
-  payload[3] = 0xFD, payload[12] = 0xFE, payload[20] = 0xFD;
+  payload[3] = 0xFD;
+  payload[12] = 0xFE;
+  payload[20] = 0xFD;
   return by_hand({0xFD, 30, 0, 0, sequence, 1, 1, 24, 0, 0}, payload, 24);
 }
 
@@ -100,7 +102,10 @@ TEST(MavlinkFrame, CutsTrailingZerosButTheFirstByte) {
 
 TEST(MavlinkFrame, TakesBothLengthsOfTimesyncAndSysStatus) {
   Bytes timesync(18, 0);
-  timesync[0] = 5, timesync[8] = 9, timesync[16] = 1, timesync[17] = 191;
+  timesync[0] = 5;
+  timesync[8] = 9;
+  timesync[16] = 1;
+  timesync[17] = 191;
   EXPECT_EQ(decode<Timesync>(timesync).target_component, 191);
   const auto older = decode<Timesync>(std::span(timesync).first(16));
   EXPECT_EQ(older.tc1, 5);

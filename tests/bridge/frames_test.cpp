@@ -11,7 +11,9 @@ namespace {
 /// Columns of R_NW: east, north and up in NED; of R_BF: forward, right and down in FLU.
 Mat3 ned_from_world() {
   Mat3 r;
-  r.col(0) = Vec3(0, 1, 0), r.col(1) = Vec3(1, 0, 0), r.col(2) = Vec3(0, 0, -1);
+  r.col(0) = Vec3(0, 1, 0);
+  r.col(1) = Vec3(1, 0, 0);
+  r.col(2) = Vec3(0, 0, -1);
   return r;
 }
 Mat3 flu_from_frd() { return Vec3(1, -1, -1).asDiagonal(); }

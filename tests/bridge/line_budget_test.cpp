@@ -91,8 +91,12 @@ TEST(LineBudget, SendsTheNextOdometryInTheFirstTickInWhichTheLineIsFree) {
     const Time now = kStart + std::chrono::milliseconds(20 * n);
     const bool dry = same.free_s <= n * 0.02;
     EXPECT_EQ(budget.carries_odometry(now), dry) << n;
-    if (dry) budget.give(kOdometry, true, now), same.give(kOdometry, n * 0.02);
-    budget.give(kSetpoint, false, now), same.give(kSetpoint, n * 0.02);
+    if (dry) {
+      budget.give(kOdometry, true, now);
+      same.give(kOdometry, n * 0.02);
+    }
+    budget.give(kSetpoint, false, now);
+    same.give(kSetpoint, n * 0.02);
   }
 }
 

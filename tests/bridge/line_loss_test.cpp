@@ -48,7 +48,10 @@ TEST(LineLoss, IsNoneWhereFramesAreUnknownOrOvertakeOneAnother) {
 
 TEST(LineLoss, OfAnAutopilotThatAnswersNoQuestionIsNotKnown) {
   LineLoss loss;
-  for (int n = 0; n < 200; ++n) exchange(loss, false), loss.heard(static_cast<std::uint8_t>(n), 0);
+  for (int n = 0; n < 200; ++n) {
+    exchange(loss, false);
+    loss.heard(static_cast<std::uint8_t>(n), 0);
+  }
   EXPECT_FALSE(loss.shares(true, false));
 }
 

@@ -47,7 +47,10 @@ Named renamed(Named named) {
       {"PSC_POSZ_P", "PSC_D_POS_P", 1},      {"WPNAV_SPEED", "WP_SPD", 0.01},    {"WPNAV_SPEED_UP", "WP_SPD_UP", 0.01},
       {"WPNAV_SPEED_DN", "WP_SPD_DN", 0.01}, {"WPNAV_ACCEL", "WP_ACC", 0.01},    {"WPNAV_ACCEL_Z", "WP_ACC_Z", 0.01},
       {"ANGLE_MAX", "ATC_ANGLE_MAX", 0.01},  {"RTL_ALT", "RTL_ALT_M", 0.01},     {"GPS_TYPE", "GPS1_TYPE", 1}};
-  for (const auto& [before, after, share] : names) named[after] = share * named[before], named.erase(before);
+  for (const auto& [before, after, share] : names) {
+    named[after] = share * named[before];
+    named.erase(before);
+  }
   return named;
 }
 const Named kArduPilot47Good = renamed(kArduPilotGood);
@@ -56,8 +59,10 @@ ParameterValues values(const AutopilotProfile& autopilot, const Named& named) {
   ParameterValues all{};
   for (std::size_t n = 0; n < autopilot.rules.size(); ++n)
     for (std::uint8_t k = 0; k < autopilot.rules[n].count(); ++k)
-      if (const auto found = named.find(autopilot.rules[n].names[k].name); found != named.end())
-        all[n].value = found->second, all[n].name = k;
+      if (const auto found = named.find(autopilot.rules[n].names[k].name); found != named.end()) {
+        all[n].value = found->second;
+        all[n].name = k;
+      }
   return all;
 }
 

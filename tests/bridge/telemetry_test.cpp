@@ -224,7 +224,8 @@ TEST(Telemetry, AddsUpCellsAndLeavesAbsentValuesAbsent) {
   EXPECT_DOUBLE_EQ(*t.battery.at(kMoment)->value.current, 2.5);
   mavlink::BatteryStatus b{.current_battery = -1250, .battery_remaining = 47};
   b.voltages.fill(65535);
-  b.voltages[0] = 4200, b.voltages[1] = 4100;
+  b.voltages[0] = 4200;
+  b.voltages[1] = 4100;
   t.take(b, kMoment);
   EXPECT_DOUBLE_EQ(*t.battery.at(kMoment)->value.voltage, 8.3);
   EXPECT_DOUBLE_EQ(*t.battery.at(kMoment)->value.remaining, 0.47);
@@ -234,7 +235,8 @@ TEST(Telemetry, AddsUpCellsAndLeavesAbsentValuesAbsent) {
   EXPECT_FALSE(t.battery.at(kMoment)->value.current);
   t.take(mavlink::SysStatus{.voltage_battery = 1, .battery_remaining = 1}, kMoment);
   EXPECT_DOUBLE_EQ(*t.battery.at(kMoment)->value.voltage, 8.3) << "BATTERY_STATUS goes before SYS_STATUS";
-  b.id = 1, b.battery_remaining = 3;
+  b.id = 1;
+  b.battery_remaining = 3;
   t.take(b, kMoment);
   EXPECT_DOUBLE_EQ(*t.battery.at(kMoment)->value.remaining, 0.47) << "a second battery is not the flight battery";
 }

@@ -29,7 +29,10 @@ std::vector<Place> numbers(const std::string& text) {
     ++line;
     const std::size_t end = std::min(text.find('\n', begin), text.find('#', begin));
     const std::string code = text.substr(begin, end - begin);
-    if (code.starts_with("[")) section = code.substr(1, code.find(']') - 1), section_line = line;
+    if (code.starts_with("[")) {
+      section = code.substr(1, code.find(']') - 1);
+      section_line = line;
+    }
     const std::size_t equals = code.find(" = ");
     if (code.starts_with("[") || equals == std::string::npos || code.find('"') != std::string::npos) continue;
     const std::string key = section + "." + code.substr(0, equals);

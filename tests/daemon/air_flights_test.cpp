@@ -122,7 +122,10 @@ class AirFlight {
   double clearance() const { return clearance_; }
   const LearningRig& rig() const { return rig_; }
 
-  void step() { planner_.step(), pass(); }
+  void step() {
+    planner_.step();
+    pass();
+  }
   /// "", or why not.
   std::string ask(PlanJob::Kind kind, const Vec3& to_W) {
     rig_.channels->jobs.offer(std::make_unique<const PlanJob>(PlanJob{kind, ++job_, to_W, {}, rig_.view().epoch}));
@@ -176,10 +179,14 @@ Counts flown(const Course& course, double strength, bool learns, int flights, do
     flight.rest(rest_s);
     const auto [inside, outside] = std::pair(flight.rig().view().inside, flight.rig().view().outside);
     flight.legs();
-    c.touched += flight.clearance() <= 0, c.arrived += flight.arrived(), c.told += flight.told();
-    c.refused += flight.refused(), c.rougher += flight.rig().largest_factor() > 1,
-        c.factor = std::max(c.factor, flight.rig().largest_factor());
-    c.inside += flight.rig().view().inside - inside, c.outside += flight.rig().view().outside - outside;
+    c.touched += flight.clearance() <= 0;
+    c.arrived += flight.arrived();
+    c.told += flight.told();
+    c.refused += flight.refused();
+    c.rougher += flight.rig().largest_factor() > 1;
+    c.factor = std::max(c.factor, flight.rig().largest_factor());
+    c.inside += flight.rig().view().inside - inside;
+    c.outside += flight.rig().view().outside - outside;
     c.clearance = std::min(c.clearance, flight.clearance());
   }
   std::printf(
@@ -253,8 +260,10 @@ TEST(AirFlights, AfterARestInCalmAirSetsAreNarrowerAndNoMoreSamplesLeaveThemThan
         after += flight.half_width() / n;
         least = std::min(least, *std::ranges::min_element(flight.rig().view().air->factors));
         flight.legs();
-        inside += flight.rig().view().inside, outside += flight.rig().view().outside;
-        touched += flight.clearance() <= 0, arrived += flight.arrived();
+        inside += flight.rig().view().inside;
+        outside += flight.rig().view().outside;
+        touched += flight.clearance() <= 0;
+        arrived += flight.arrived();
       }
       std::printf(
           "%-10s x%g rests %g s, %d flights: half width %.3f -> %.3f m, factor down to %.2f; %d touched, %d flew all "

@@ -12,7 +12,8 @@ inline adapt::InFlightConstants learning(double calmest = 1) {
   air.calmest = calmest;
   air.controller = vehicle_5in().controller;
   air.gusts.tau_low_s = air.gusts.tau_high_s = model.bound.tau_w;
-  air.gusts.mean_horizontal = model.bound.mean_horizontal, air.gusts.mean_vertical = model.bound.mean_vertical;
+  air.gusts.mean_horizontal = model.bound.mean_horizontal;
+  air.gusts.mean_vertical = model.bound.mean_vertical;
   return air;
 }
 

@@ -146,8 +146,11 @@ TEST_F(CalmAir, ASegmentOfSmootherAirThanIsKnownIsRefusedInTheTickUnlessItContin
   rig.tick();
   EXPECT_EQ(rig.view().segment, id);
   track::AcceptedSegment on;  // as it slows down, or is led back
-  on.id = id + 1, on.continues = id, on.branch = rig.view().index;
-  on.closures = rig.view().closures, on.epoch = rig.view().epoch;
+  on.id = id + 1;
+  on.continues = id;
+  on.branch = rig.view().index;
+  on.closures = rig.view().closures;
+  on.epoch = rig.view().epoch;
   on.commands = here;
   on.tube = plan::tube_to_rest(rig.world(), rig.view().state, here[0], here);
   rig.channels->segments.offer(std::make_unique<const track::AcceptedSegment>(on));

@@ -39,9 +39,11 @@ TEST(Doubts, OfALineBeginWhereItTakesLongerThanTheSetsAllow) {
 
 TEST(Doubts, OfTheEstimatorAndOfArmingAreTheAutopilotsOwn) {
   ControlView view;
-  view.estimator_follows = true, view.would_arm = false;
+  view.estimator_follows = true;
+  view.would_arm = false;
   EXPECT_EQ(all(view), "") << "it is not asked to arm in this mode";
-  view.offboard = true, view.estimator_follows = false;
+  view.offboard = true;
+  view.estimator_follows = false;
   EXPECT_EQ(all(view).rfind("estimator: ", 0), 0U);
   EXPECT_NE(all(view).find("\narming: "), std::string::npos);
   view.armed = true;

@@ -49,7 +49,10 @@ void EpochModel::tick(Daemon& d) {
     if (!(out.accepted && offered->arms && d.takeoff_asked)) fail("armed without the take-off that was asked for");
     if (!armed_before) d.arming = 2;
   }
-  if (out.disarm && d.in.autopilot.landed.value_or(false)) d.in.autopilot.armed = false, d.arming = 0;
+  if (out.disarm && d.in.autopilot.landed.value_or(false)) {
+    d.in.autopilot.armed = false;
+    d.arming = 0;
+  }
   const bool follows = out.supervisor.send_setpoint;
   const Vec3 now = follows ? out.command.p_W : d.before;
   if (d.since_end >= 0) {
@@ -97,7 +100,11 @@ bool EpochModel::command(Daemon& d, std::uint8_t verb) {
   const bool accepted = carry_out(d, d.mission.handle(c, static_cast<double>(d.in.now_ns) * 1e-9));
   if (!accepted) return false;
   const bool ends = verb == GetParam();
-  if (ends) d.since_end = 0, d.held = verb == kHold, d.takeoff_asked = false;
+  if (ends) {
+    d.since_end = 0;
+    d.held = verb == kHold;
+    d.takeoff_asked = false;
+  }
   if (!ends) d.since_end = -1;
   if (verb == kTakeoff) d.takeoff_asked = true;
   return true;

@@ -20,8 +20,12 @@ TEST(VioFreezeFault, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway
     rig.ticks(100);
     std::optional<OdometrySample> frozen;
     rig.spoil = [&](OdometrySample& s) {
-      if (!frozen) frozen = s, frozen->state.v_W.setZero();
-      s.state = frozen->state, s.q = frozen->q;
+      if (!frozen) {
+        frozen = s;
+        frozen->state.v_W.setZero();
+      }
+      s.state = frozen->state;
+      s.q = frozen->q;
     };
     EXPECT_GT(rig.ticks_until(Mode::hold, 7), 0) << "flown on a frozen pose";
     EXPECT_GT(rig.ticks_until(Mode::land, 60), 0);
@@ -36,8 +40,12 @@ TEST(VioFreezeFault, AVioThatFreezesBeforeTheVehicleLeavesTheGroundEndsTheTakeOf
   ASSERT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
   std::optional<OdometrySample> frozen;
   rig.spoil = [&](OdometrySample& s) {
-    if (!frozen) frozen = s, frozen->state.v_W.setZero();
-    s.state = frozen->state, s.q = frozen->q;
+    if (!frozen) {
+      frozen = s;
+      frozen->state.v_W.setZero();
+    }
+    s.state = frozen->state;
+    s.q = frozen->q;
   };
   rig.tick();
   rig.offer(rig.rise(), true, true);

@@ -62,7 +62,10 @@ Reason reason_after_carrying(const std::function<void(State&, Eigen::Quaterniond
 
 TEST(FrameMismatchFault, AFrameOrYawThatDoesNotMatchIsRefusedBeforeEnablingNamingTheAxis) {
   const auto mirrored = [](int axis) {
-    return [axis](State& s, Eigen::Quaterniond&) { s.p_W[axis] *= -1, s.v_W[axis] *= -1; };
+    return [axis](State& s, Eigen::Quaterniond&) {
+      s.p_W[axis] *= -1;
+      s.v_W[axis] *= -1;
+    };
   };
   const auto turned = [](double angle) {
     return [angle](State& s, Eigen::Quaterniond&) {

@@ -158,7 +158,10 @@ void Lockstep::read_wire(std::size_t expected) {
       if constexpr (std::is_same_v<M, SetPositionTargetLocalNed>) wire_.setpoints.push_back(message);
       if constexpr (std::is_same_v<M, CommandLong>) wire_.commands.push_back(message);
       if constexpr (std::is_same_v<M, mavlink::Heartbeat>) ++wire_.heartbeats;
-      if constexpr (std::is_same_v<M, mavlink::Odometry>) ++wire_.odometry, wire_.odometry_us = message.time_usec;
+      if constexpr (std::is_same_v<M, mavlink::Odometry>) {
+        ++wire_.odometry;
+        wire_.odometry_us = message.time_usec;
+      }
       if constexpr (std::is_same_v<M, mavlink::Statustext>)
         wire_.texts.emplace_back(message.text.data(), ::strnlen(message.text.data(), message.text.size()));
     });

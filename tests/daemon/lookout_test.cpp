@@ -113,7 +113,9 @@ TEST(Lookout, FindsAVoxelInTheWayExactlyWhereTheSetsDo) {
     const bool by_stop = in_way(ahead[0].first(stop->branch - f.flight.tracker().index()), p) ||
                          in_way(std::span<const reach::TubeStep>(stop->tube), p);
     ASSERT_EQ(seen.stop_blocked, by_stop) << p.transpose();
-    in_tube += tube, in_stop += by_stop, beside += !tube;
+    in_tube += tube;
+    in_stop += by_stop;
+    beside += !tube;
   }
   EXPECT_GT(in_tube, 300u);
   EXPECT_GT(in_stop, 100u);
@@ -166,9 +168,16 @@ TEST(Lookout, AVoxelOfBeforeALoopClosureIsNotHeldAgainstASegmentOfAfterIt) {
     voxel.received_ns = 1;  // after the map of any segment here
     EXPECT_TRUE(f.channels->scan_voxels.push(voxel));
     EXPECT_FALSE(f.lookout.look(f.flight, f.in.now_ns).tube_blocked);
-    if (closes) f.closures = 2, f.closure.t = t, f.tick();
+    if (closes) {
+      f.closures = 2;
+      f.closure.t = t;
+      f.tick();
+    }
     track::AcceptedSegment on = f.segment;  // through where the voxel was in the map of then
-    on.id = 2, on.continues = 1, on.branch = 20, on.closures = f.closures;
+    on.id = 2;
+    on.continues = 1;
+    on.branch = 20;
+    on.closures = f.closures;
     for (auto& c : on.commands) c.p_W += t;
     for (auto& s : on.tube) s.center.p_W += t;
     on.stops.clear();

@@ -27,7 +27,11 @@ TEST(MapParts, APartThatIsNoneOfItsMapIsRefused) {
   };
   EXPECT_THAT(refused([](auto& p) { p.size = (1u << 20) + 1; }), HasSubstr("at most 1048576"));
   EXPECT_THAT(refused([](auto& p) { p.size = 0; }), HasSubstr("at least 1"));
-  EXPECT_THAT(refused([](auto& p) { p.number = 3, p.data._length = 3000 - 2 * dds::kPartBytes; }), HasSubstr("part 3"));
+  EXPECT_THAT(refused([](auto& p) {
+                p.number = 3;
+                p.data._length = 3000 - 2 * dds::kPartBytes;
+              }),
+              HasSubstr("part 3"));
   EXPECT_THAT(refused([](auto& p) { p.data._length = 1151; }), HasSubstr("has 1151"));
   const std::string odom = "odom";
   EXPECT_THAT(refused([&](auto& p) { p.frame_id = dds::c_string(odom); }), HasSubstr("'map'"));

@@ -74,7 +74,10 @@ TEST(SlowLine, AStreamThatAStationTakesAwayIsBackBeforeItIsMissed) {
     rig.autopilot->receive(mavlink::encode_frame({255, 190, 0}, once_a_second).view(),
                            static_cast<double>(rig.now_ns()) * 1e-9);
     double oldest = 0;
-    for (int n = 0; n < 200; ++n) rig.tick(), oldest = std::max(oldest, rig.view().pose_age);
+    for (int n = 0; n < 200; ++n) {
+      rig.tick();
+      oldest = std::max(oldest, rig.view().pose_age);
+    }
     EXPECT_GT(oldest, 0.1) << "it was taken away";
     EXPECT_LT(oldest, 0.2) << "HOLD is at 0.3 s";
   }

@@ -210,7 +210,8 @@ TEST_F(MissionRefusals, OrdersAboutTheAirWhereNothingIsLearntOfIt) {
 TEST_F(MissionRefusals, AResetOfTheAirThatWouldShrinkSetsThatMayBeFlown) {
   view_.air.emplace();
   const auto reset = [&](Mode mode, bool armed) {
-    view_.mode = mode, view_.armed = armed;
+    view_.mode = mode;
+    view_.armed = armed;
     look();
     return give(gcs_.next(kAirReset));
   };

@@ -46,9 +46,12 @@ TEST_F(Route, GoesOnFromTheEndOfAFlightAndNotFromARestOnTheWay) {
 CommandMessage turned_route(Station& station) {
   CommandMessage follow = station.next(kFollowFacing);
   follow.waypoints = 6;
-  follow.waypoint[0] = {0, 0, 1.2}, follow.waypoint[1] = {1, 0, 1.2};
-  follow.waypoint[2] = {1, 0, 1.2}, follow.waypoint[3] = {1, 0, 5};
-  follow.waypoint[4] = {0, 0, 1.2}, follow.waypoint[5] = {-3, -3, 0};
+  follow.waypoint[0] = {0, 0, 1.2};
+  follow.waypoint[1] = {1, 0, 1.2};
+  follow.waypoint[2] = {1, 0, 1.2};
+  follow.waypoint[3] = {1, 0, 5};
+  follow.waypoint[4] = {0, 0, 1.2};
+  follow.waypoint[5] = {-3, -3, 0};
   return follow;
 }
 

@@ -202,7 +202,8 @@ TEST(VioFreezeFault, FiveIdenticalPosesUnderCommandedMotionHold) {
   std::optional<OdometrySample> frozen;
   rig.spoil = [&](OdometrySample& s) {
     if (!frozen) frozen = s;
-    s.state = frozen->state, s.q = frozen->q;
+    s.state = frozen->state;
+    s.q = frozen->q;
   };
   // The first one, then three that repeat it: still tracking.
   rig.ticks(4);
@@ -218,7 +219,8 @@ TEST(VioFreezeFault, IdenticalPosesOnTheGroundAreNoFault) {
   std::optional<OdometrySample> frozen;
   rig.spoil = [&](OdometrySample& s) {
     if (!frozen) frozen = s;
-    s.state = frozen->state, s.q = frozen->q;
+    s.state = frozen->state;
+    s.q = frozen->q;
   };
   rig.ticks(25);
   EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));

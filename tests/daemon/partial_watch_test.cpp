@@ -95,7 +95,8 @@ TEST(PartialSample, HasNoMoreFragmentsThanADatagramHasBytesFor) {
 }
 
 void finish(Fragment f) {
-  f.first = 1, f.several = static_cast<std::uint16_t>(kCount);
+  f.first = 1;
+  f.several = static_cast<std::uint16_t>(kCount);
   note(f);
 }
 

@@ -214,7 +214,10 @@ TEST_F(HugeMapFault, AFewBytesThatMeanAHugeMapAreRefusedBeforeTheyCostMemoryOrTi
   const auto begun = std::chrono::steady_clock::now();
   std::uint64_t sent = 0;
   for (const auto& bomb : bombs)
-    for (const double resolution : {0.02, 0.2}) send(*channels_, bomb, resolution), ++sent;
+    for (const double resolution : {0.02, 0.2}) {
+      send(*channels_, bomb, resolution);
+      ++sent;
+    }
   EXPECT_EQ(channels_->maps_rejected, sent);
   EXPECT_EQ(channels_->maps_accepted, 0u);
   EXPECT_EQ(channels_->worlds.control.take(), nullptr);

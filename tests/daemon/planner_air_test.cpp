@@ -39,7 +39,8 @@ class CalmGap : public PlannerWatch {
  protected:
   void come_to(double x) {
     OccupancyGrid grid = room();
-    fill(grid, {35, 0, 1}, {42, 17, 19}), fill(grid, {35, 23, 1}, {42, 39, 19});
+    fill(grid, {35, 0, 1}, {42, 17, 19});
+    fill(grid, {35, 23, 1}, {42, 39, 19});
     know(grid);
     stand({1.05, 2.05, 1.05});
     learn({0.1, 0.1, 0.1, 0.1, 1});
@@ -135,7 +136,9 @@ TEST_F(PlannerWatch, AFlightIsStillVerifiedWhileItMayNotBeExtendedInCalmerAir) {
   EXPECT_EQ(offers_.size(), 1u) << "nothing new";
   EXPECT_EQ(channels_->blocked_segment, view_.segment) << "and not what a wall is in the way of";
   // Braking for it, it is led around the wall as soon as there are sets that the air allows.
-  view_.mode = Mode::hold, view_.reason = Reason::obstacle_ahead, view_.braking = true;
+  view_.mode = Mode::hold;
+  view_.reason = Reason::obstacle_ahead;
+  view_.braking = true;
   view_.stop_branch = next_branch();
   show();
   planner_.step();
@@ -184,7 +187,8 @@ TEST_F(PlannerWatch, NothingNewIsFlownBySetsOfSmootherAirThanIsKnownYet) {
   view_.air->factors[1] = 1.25;
   show();
   EXPECT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}), "") << "no world is made anew for so little";
-  offers_.clear(), view_.segment = 0;
+  offers_.clear();
+  view_.segment = 0;
   stand({1.05, 2.05, 1.05});
   view_.air->factors[1] = 1.5;
   show();
@@ -242,7 +246,10 @@ TEST_F(CalmGap, NoStopIsOfferedInTheFrameOfBeforeALoopClosure) {
     come_to(1.7);
     view_.shift.t = {0, 0.1, 0};
     if (between)
-      answer_ = [this](const auto& s) { view_.closures = 1, view_.refused_segment = s.id; };
+      answer_ = [this](const auto& s) {
+        view_.closures = 1;
+        view_.refused_segment = s.id;
+      };
     else
       view_.closures = 1;
     learn(kModelledAir);

@@ -75,7 +75,8 @@ TEST_F(PlannerOffers, APlanAroundACornerKeepsWhatTheFramesAreApart) {
   know(grid);
   const auto clearance = [&](double residual) {
     offers_.clear();
-    view_.segment = 0, view_.residual_m = residual;
+    view_.segment = 0;
+    view_.residual_m = residual;
     stand({1.05, 1.05, 1.05});
     EXPECT_EQ(ask(PlanJob::Kind::go_to, {5.05, 1.05, 1.05}), "");
     return offers_.empty() ? 0 : offers_[0].clearance;
@@ -95,7 +96,8 @@ TEST_F(PlannerOffers, AWayTowardsTheUnknownKeepsWhatTheFramesAreApart) {
   know(grid);
   const auto clearance = [&](double residual) {
     offers_.clear();
-    view_.segment = 0, view_.residual_m = residual;
+    view_.segment = 0;
+    view_.residual_m = residual;
     stand({1.05, 1.05, 1.05});
     EXPECT_EQ(ask(PlanJob::Kind::go_to, {5.35, 1.05, 1.05}), "");
     return offers_.empty() ? 0 : offers_[0].clearance;
@@ -108,12 +110,17 @@ TEST_F(PlannerOffers, AWayTowardsTheUnknownKeepsWhatTheFramesAreApart) {
 
 // What it shows in motion is delay: what flies keeps what was measured when it began.
 TEST_F(PlannerWatch, WhatContinuesAFlightKeepsWhatTheFramesWereApartWhenItBegan) {
-  const std::vector<std::function<void()>> events{
-      [&] { EXPECT_EQ(ask(PlanJob::Kind::brake, Vec3::Zero()), ""); },
-      [&] {
-        view_.closures = 1, view_.shift.t = {0, 0.1, 0}, show(), planner_.step();
-      },
-      [&] { know(walled(3.8, true)), planner_.step(); }};
+  const std::vector<std::function<void()>> events{[&] { EXPECT_EQ(ask(PlanJob::Kind::brake, Vec3::Zero()), ""); },
+                                                  [&] {
+                                                    view_.closures = 1;
+                                                    view_.shift.t = {0, 0.1, 0};
+                                                    show();
+                                                    planner_.step();
+                                                  },
+                                                  [&] {
+                                                    know(walled(3.8, true));
+                                                    planner_.step();
+                                                  }};
   for (const auto& event : events) {
     offers_.clear();
     view_ = {};
@@ -151,11 +158,13 @@ TEST_F(PlannerWatch, AFlightGoesRoundWhatLeavesLessThanTheFramesAreApart) {
 // Stops rest nearer to obstacles than the flight passes them.
 TEST_F(PlannerOffers, NoStopThatRestsWhereTheFramesLeaveTooLittle) {
   OccupancyGrid grid = room();
-  fill(grid, {28, 0, 1}, {29, 16, 19}), fill(grid, {28, 24, 1}, {29, 39, 19});
+  fill(grid, {28, 0, 1}, {29, 16, 19});
+  fill(grid, {28, 24, 1}, {29, 39, 19});
   know(grid);
   const auto resting_within = [&](double residual) {
     offers_.clear();
-    view_.segment = 0, view_.residual_m = residual;
+    view_.segment = 0;
+    view_.residual_m = residual;
     stand({1.05, 2.05, 1.05});
     EXPECT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.05, 1.05}), "");
     double least = INFINITY;

@@ -11,13 +11,28 @@ using PlannerLift = PlannerOffers;
 TEST_F(PlannerLift, ATakeoffEndsWithItsLiftOffHoweverThatEnds) {
   const std::function<void()> ends[] = {
       // accepted in the tick in which something came in its way: a hold that is no lapse
-      [&] { view_.mode = Mode::hold, view_.reason = Reason::obstacle_ahead; },
-      [&] { view_.mode = Mode::hold, view_.segment = 0; },
-      [&] { view_.mode = Mode::passive, view_.segment = 0; },
+      [&] {
+        view_.mode = Mode::hold;
+        view_.reason = Reason::obstacle_ahead;
+      },
+      [&] {
+        view_.mode = Mode::hold;
+        view_.segment = 0;
+      },
+      [&] {
+        view_.mode = Mode::passive;
+        view_.segment = 0;
+      },
       [&] { view_.mode = Mode::quiet; },
       [&] { view_.mode = Mode::land; },
-      [&] { view_.mode = Mode::tracking, view_.segment = offers_.back().id; },
-      [&] { view_.mode = Mode::lifting, view_.segment = offers_.back().id + 1; },
+      [&] {
+        view_.mode = Mode::tracking;
+        view_.segment = offers_.back().id;
+      },
+      [&] {
+        view_.mode = Mode::lifting;
+        view_.segment = offers_.back().id + 1;
+      },
       [&] { ++view_.epoch.order; },
       [&] { channels_->stop = true; },
   };
@@ -29,7 +44,8 @@ TEST_F(PlannerLift, ATakeoffEndsWithItsLiftOffHoweverThatEnds) {
     int pauses = 0;
     meanwhile_ = [&] {
       if (offers_.empty()) return;
-      view_.mode = Mode::lifting, view_.segment = offers_.back().id;
+      view_.mode = Mode::lifting;
+      view_.segment = offers_.back().id;
       if (pauses++ > 3) end();
       if (pauses > 500) channels_->stop = true;
     };
@@ -47,7 +63,8 @@ TEST_F(PlannerLift, ANewWorldDuringTheLiftIsVerifiedBeforeItIsOver) {
   int pauses = 0;
   meanwhile_ = [&] {
     if (offers_.empty()) return;
-    view_.mode = Mode::lifting, view_.segment = offers_.back().id;
+    view_.mode = Mode::lifting;
+    view_.segment = offers_.back().id;
     OccupancyGrid changed = room();
     if (++pauses == 5) know(changed);  // clear as before
     if (pauses == 10) {
@@ -55,7 +72,10 @@ TEST_F(PlannerLift, ANewWorldDuringTheLiftIsVerifiedBeforeItIsOver) {
       fill(changed, {28, 18, 8}, {32, 22, 9});
       know(changed);
     }
-    if (pauses >= 15) view_.mode = Mode::land, ++view_.epoch.lapse;
+    if (pauses >= 15) {
+      view_.mode = Mode::land;
+      ++view_.epoch.lapse;
+    }
   };
   EXPECT_NE(ask(PlanJob::Kind::takeoff, {0, 0, 1.0}).find("ended"), std::string::npos);
   EXPECT_EQ(channels_->blocked_segment, offers_.at(0).id);

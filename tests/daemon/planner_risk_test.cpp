@@ -15,7 +15,8 @@ class PlannerByRisk : public PlannerOffers {
  protected:
   static Vehicle vehicle() {
     Vehicle vehicle = vehicle_5in();
-    vehicle.controller.kp = {1.71, 1.71}, vehicle.controller.kd = {1.8, 1.8};  // PX4's own defaults
+    vehicle.controller.kp = {1.71, 1.71};
+    vehicle.controller.kd = {1.8, 1.8};  // PX4's own defaults
     return vehicle;
   }
   /// A room with a wall across it, and a gap of so many voxels in that.

@@ -107,7 +107,8 @@ TEST_F(PlannerWatch, AfterALoopClosureAFlightThatWasToldToHoldStaysWhereItIs) {
 TEST_F(PlannerWatch, AHoldInANarrowGapIsARestBehindIt) {
   constexpr double kGap = 3.0;  // m, along x
   OccupancyGrid grid = room();
-  fill(grid, {29, 0, 1}, {30, 15, 19}), fill(grid, {29, 24, 1}, {30, 39, 19});
+  fill(grid, {29, 0, 1}, {30, 15, 19});
+  fill(grid, {29, 24, 1}, {30, 39, 19});
   know(grid);
   stand({1.05, 2.13, 1.05});
   ASSERT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.13, 1.05}), "");
@@ -157,7 +158,8 @@ TEST_F(PlannerWatch, AFlightThatSlowsDownForAHoldHasAStopAheadUntilItRests) {
 // stop.
 TEST_F(PlannerWatch, WhereNoHarderStopIsClearAHoldsOwnWayIsTheStop) {
   OccupancyGrid grid = room();
-  fill(grid, {29, 0, 1}, {30, 15, 19}), fill(grid, {29, 24, 1}, {30, 39, 19});
+  fill(grid, {29, 0, 1}, {30, 15, 19});
+  fill(grid, {29, 24, 1}, {30, 39, 19});
   know(grid);
   stand({1.05, 2.13, 1.05});
   ASSERT_EQ(ask(PlanJob::Kind::go_to, {5.05, 2.13, 1.05}), "");
@@ -174,8 +176,11 @@ TEST_F(PlannerWatch, WhereNoHarderStopIsClearAHoldsOwnWayIsTheStop) {
     if (!clear(now + 15, a_max) || clear(now + 10, 2 * a_max) || clear(now + 20, 2 * a_max)) continue;
     ++tried;
     offers_.resize(1);
-    view_.segment = flown.id, view_.index = now;
-    view_.command = flown.commands[now], view_.state = flown.tube[now].center, view_.finished = false;
+    view_.segment = flown.id;
+    view_.index = now;
+    view_.command = flown.commands[now];
+    view_.state = flown.tube[now].center;
+    view_.finished = false;
     show();
     ASSERT_EQ(ask(PlanJob::Kind::brake, Vec3::Zero()), "");
     ASSERT_EQ(offers_.size(), 2u);

@@ -60,7 +60,10 @@ Course fly_with(const Wrong& wrong, bool follows_yaw) {
   Mat3 before = Mat3::Identity();
   Vec3 true_before = Vec3::Zero();
   rig.spoil = [&](OdometrySample& s) {
-    if (!pivot) pivot = s, integrated = true_before = s.state.p_W;
+    if (!pivot) {
+      pivot = s;
+      integrated = true_before = s.state.p_W;
+    }
     const double t = static_cast<double>(s.stamp_ns - pivot->stamp_ns) * 1e-9;
     const Mat3 M = wrong.linear(t);
     // A frame that goes wrong by and by carries its positions on from where they are.
@@ -79,8 +82,10 @@ Course fly_with(const Wrong& wrong, bool follows_yaw) {
     rig.tick();
     course.off = std::max(course.off, from_route(rig.route(), rig.autopilot->truth().p_W));
     course.down = !rig.autopilot->armed();
-    if (course.ticks_to_hold < 0 && rig.mode() != Mode::tracking)
-      course.ticks_to_hold = n, course.reason = rig.reason();  // the first sample only sets the pivot
+    if (course.ticks_to_hold < 0 && rig.mode() != Mode::tracking) {
+      course.ticks_to_hold = n;
+      course.reason = rig.reason();
+    }  // the first sample only sets the pivot
     if (rig.mode() != Mode::hold || rig.wire().setpoints.empty()) continue;
     const Vec3 p = rig.in_map(rig.wire().setpoints[0]).p_W;
     if (held && (p - *held).head<2>().norm() > 1e-3) course.moved = true;

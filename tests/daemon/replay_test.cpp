@@ -199,7 +199,8 @@ TEST(Offer, ComesBackAsItWentIn) {
   EXPECT_EQ((*back)->commands[1].a_W, Vec3(7, 8, 9));
   for (std::size_t n = 0; n < bytes.size(); n += 8)
     EXPECT_FALSE(log::decode_offer(std::span(bytes).first(n))) << "cut at " << n;
-  s.worst = 2.5, s.worst_at_rest = 1.5;
+  s.worst = 2.5;
+  s.worst_at_rest = 1.5;
   EXPECT_EQ(log::decode_offer(log::encode(s)).value()->worst, 2.5);
   EXPECT_EQ(log::decode_offer(log::encode(s)).value()->worst_at_rest, 1.5);
   s.worst = 0.5;

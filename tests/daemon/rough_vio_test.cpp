@@ -57,7 +57,9 @@ TEST(PoseFaults, RoughFlightsOnANoisyVioAreNeverHeld) {
     const Vec3 home = rig.view().command.p_W;
     RoughVio vio(rig, seed);
     for (int leg = 0; leg < 5; ++leg) {
-      rig.spoil = nullptr, rig.vio_on = true, rig.vio_age_steps = 0;
+      rig.spoil = nullptr;
+      rig.vio_on = true;
+      rig.vio_age_steps = 0;
       rig.ticks(100);
       rig.offer(eights(rig.view().command, home, 18), false);
       rig.tick();

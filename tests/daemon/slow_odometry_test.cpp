@@ -160,7 +160,10 @@ TEST(SlowOdometry, AJumpIsHeldInItsTick) {
   rig.take_off();
   rig.start_route(2);
   bool jumped = false;
-  rig.vio.spoil = [&](OdometrySample& s) { s.state.p_W.y() += 0.3, jumped = true; };
+  rig.vio.spoil = [&](OdometrySample& s) {
+    s.state.p_W.y() += 0.3;
+    jumped = true;
+  };
   while (!jumped) rig.tick();
   EXPECT_EQ(rig.mode(), Mode::hold);
   EXPECT_EQ(rig.reason(), Reason::odometry_jump) << to_string(rig.reason());
@@ -172,7 +175,10 @@ TEST(SlowOdometry, AnErrorOutsideItsSetIsAHoldTwoTicksAfterItsSample) {
   rig.take_off();
   rig.start_route(2);
   // No jump, no contradiction: the twist tells of the way.
-  rig.vio.spoil = [&](OdometrySample& s) { s.state.p_W.y() += 0.08, s.state.v_W.y() += 1.5; };
+  rig.vio.spoil = [&](OdometrySample& s) {
+    s.state.p_W.y() += 0.08;
+    s.state.v_W.y() += 1.5;
+  };
   const std::uint64_t before = rig.view().outside;
   int n = 0;
   for (; n < 6 && rig.view().outside == before; ++n) rig.tick();

@@ -106,11 +106,26 @@ void* __libc_realloc(void*, std::size_t);
 void* __libc_memalign(std::size_t, std::size_t);
 void __libc_free(void*);
 
-void* malloc(std::size_t size) { return note(&Trapped::allocations), __libc_malloc(size); }
-void* calloc(std::size_t n, std::size_t size) { return note(&Trapped::allocations), __libc_calloc(n, size); }
-void* realloc(void* p, std::size_t size) { return note(&Trapped::allocations), __libc_realloc(p, size); }
-void* memalign(std::size_t a, std::size_t size) { return note(&Trapped::allocations), __libc_memalign(a, size); }
-void* aligned_alloc(std::size_t a, std::size_t size) { return note(&Trapped::allocations), __libc_memalign(a, size); }
+void* malloc(std::size_t size) {
+  note(&Trapped::allocations);
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t n, std::size_t size) {
+  note(&Trapped::allocations);
+  return __libc_calloc(n, size);
+}
+void* realloc(void* p, std::size_t size) {
+  note(&Trapped::allocations);
+  return __libc_realloc(p, size);
+}
+void* memalign(std::size_t a, std::size_t size) {
+  note(&Trapped::allocations);
+  return __libc_memalign(a, size);
+}
+void* aligned_alloc(std::size_t a, std::size_t size) {
+  note(&Trapped::allocations);
+  return __libc_memalign(a, size);
+}
 int posix_memalign(void** p, std::size_t a, std::size_t size) {
   note(&Trapped::allocations);
   *p = __libc_memalign(a, size);
@@ -123,31 +138,38 @@ void free(void* p) {
 
 int pthread_mutex_lock(pthread_mutex_t* m) noexcept {
   static auto* const real = next<int(pthread_mutex_t*)>("pthread_mutex_lock");
-  return note(&Trapped::locks), real(m);
+  note(&Trapped::locks);
+  return real(m);
 }
 int pthread_mutex_timedlock(pthread_mutex_t* m, const timespec* t) noexcept {
   static auto* const real = next<int(pthread_mutex_t*, const timespec*)>("pthread_mutex_timedlock");
-  return note(&Trapped::locks), real(m, t);
+  note(&Trapped::locks);
+  return real(m, t);
 }
 int pthread_rwlock_rdlock(pthread_rwlock_t* l) noexcept {
   static auto* const real = next<int(pthread_rwlock_t*)>("pthread_rwlock_rdlock");
-  return note(&Trapped::locks), real(l);
+  note(&Trapped::locks);
+  return real(l);
 }
 int pthread_rwlock_wrlock(pthread_rwlock_t* l) noexcept {
   static auto* const real = next<int(pthread_rwlock_t*)>("pthread_rwlock_wrlock");
-  return note(&Trapped::locks), real(l);
+  note(&Trapped::locks);
+  return real(l);
 }
 int pthread_cond_wait(pthread_cond_t* c, pthread_mutex_t* m) {
   static auto* const real = next<int(pthread_cond_t*, pthread_mutex_t*)>("pthread_cond_wait");
-  return note(&Trapped::locks), real(c, m);
+  note(&Trapped::locks);
+  return real(c, m);
 }
 int pthread_cond_timedwait(pthread_cond_t* c, pthread_mutex_t* m, const timespec* t) {
   static auto* const real = next<int(pthread_cond_t*, pthread_mutex_t*, const timespec*)>("pthread_cond_timedwait");
-  return note(&Trapped::locks), real(c, m, t);
+  note(&Trapped::locks);
+  return real(c, m, t);
 }
 int sem_wait(sem_t* s) {
   static auto* const real = next<int(sem_t*)>("sem_wait");
-  return note(&Trapped::locks), real(s);
+  note(&Trapped::locks);
+  return real(s);
 }
 
 int clock_gettime(clockid_t id, timespec* t) noexcept {
@@ -157,11 +179,13 @@ int clock_gettime(clockid_t id, timespec* t) noexcept {
 }
 int gettimeofday(timeval* t, void* zone) noexcept {
   static auto* const real = next<int(timeval*, void*)>("gettimeofday");
-  return note(&Trapped::wall_clock), real(t, zone);
+  note(&Trapped::wall_clock);
+  return real(t, zone);
 }
 time_t time(time_t* t) noexcept {
   static auto* const real = next<time_t(time_t*)>("time");
-  return note(&Trapped::wall_clock), real(t);
+  note(&Trapped::wall_clock);
+  return real(t);
 }
 
 ssize_t write(int fd, const void* bytes, std::size_t size) {

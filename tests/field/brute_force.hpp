@@ -58,7 +58,10 @@ inline std::vector<Piece> pieces(const OccupancyGrid& grid) {
         for (int di = -2; di <= 2; ++di)
           for (int dj = -2; dj <= 2; ++dj)
             for (int dk = -1; dk <= 1; ++dk)
-              if (cell(grid, i + di, j + dj, k + dk) != Cell::free) gx -= di, gy -= dj;
+              if (cell(grid, i + di, j + dj, k + dk) != Cell::free) {
+                gx -= di;
+                gy -= dj;
+              }
         const auto has = [&](int f) { return std::count(faces.begin(), faces.end(), f) > 0; };
         const double norm = std::sqrt(gx * gx + gy * gy);
         bool looks_out = false;
@@ -69,7 +72,10 @@ inline std::vector<Piece> pieces(const OccupancyGrid& grid) {
           int chosen = -1;
           double most = -2;
           for (const int f : faces)
-            if (mx * dx[f] + my * dy[f] > most + 1e-9) chosen = f, most = mx * dx[f] + my * dy[f];
+            if (mx * dx[f] + my * dy[f] > most + 1e-9) {
+              chosen = f;
+              most = mx * dx[f] + my * dy[f];
+            }
           int down = k;
           while (cell(grid, i + dx[chosen], j + dy[chosen], down) == Cell::free) --down;
           std::optional<Vec3> corner;
@@ -148,7 +154,9 @@ inline Parts evaluate(const OccupancyGrid& grid, const std::vector<Piece>& all, 
     }
     if (ground.isZero(0) && corner.isZero(0) && wall.isZero(0)) continue;
     if (!sees(occupied, a, p, e.c)) continue;
-    sum.ground += ground, sum.corner += corner, sum.wall += wall;
+    sum.ground += ground;
+    sum.corner += corner;
+    sum.wall += wall;
   }
   return sum;
 }

@@ -65,9 +65,14 @@ TEST(ProximityField, EqualsBruteForceOnRandomMaps) {
 
 TEST(ProximityField, EqualsBruteForceWithOtherGates) {
   Model model;
-  model.ground.theta_max = 0.6, model.ground.l_max = 0.5, model.ground.r0 = 0.3, model.ground.l_footprint_max = 0.9;
-  model.corner.phi_max = 1.8, model.corner.l_max = 2.5;
-  model.wall.theta_min = 0, model.wall.l_max = 0.8;
+  model.ground.theta_max = 0.6;
+  model.ground.l_max = 0.5;
+  model.ground.r0 = 0.3;
+  model.ground.l_footprint_max = 0.9;
+  model.corner.phi_max = 1.8;
+  model.corner.l_max = 2.5;
+  model.wall.theta_min = 0;
+  model.wall.l_max = 0.8;
   Index3 nonzero(0, 0, 0);
   for (unsigned seed = 100; seed < 108; ++seed) {
     const OccupancyGrid grid = scene::random_map(seed, 0.1);

@@ -68,7 +68,8 @@ TEST(Yaw, ChangesTheWallTermByLessThanTenPercentAtAPointAndInTheMeanAlongTheWall
           const Parts a = parts(turned, kOn, n, 0.1 * voxels, 0.05 * shift, z);
           if (shift == 0) expect_within_ten_percent(a.wall, e.wall, "at a point, " + where(degrees, voxels, z));
           if (z == 0.8) expect_within_ten_percent(a.corner, e.corner, "corner, " + where(degrees, voxels, z));
-          expected.wall += e.wall, actual.wall += a.wall;
+          expected.wall += e.wall;
+          actual.wall += a.wall;
         }
         expect_within_ten_percent(actual.wall, expected.wall, "in the mean, " + where(degrees, voxels, z));
       }
@@ -131,8 +132,8 @@ TEST(Halving, ChangesSigmaByLessThanTenPercentBesideAFlatWallAtFaceHeightsAndInT
       const Vec3 p = kOn + Vec3(-l, 0.013 * step, z);
       const Variance actual = coarse.exact.at(p).sigma(), expected = fine.exact.at(p).sigma();
       EXPECT_GT(fine.exact.at(p).wall.xx, 0);
-      actual_mean += Vec3(actual.xx, actual.yy, actual.zz),
-          expected_mean += Vec3(expected.xx, expected.yy, expected.zz);
+      actual_mean += Vec3(actual.xx, actual.yy, actual.zz);
+      expected_mean += Vec3(expected.xx, expected.yy, expected.zz);
       if (step == 0) expect_within_ten_percent(actual_mean, expected_mean, "l " + std::to_string(l));
     }
     expect_within_ten_percent(actual_mean, expected_mean, "mean, l " + std::to_string(l));

@@ -58,10 +58,11 @@ inline OccupancyGrid small_room(double a = 0.1) {
   };
   paint(grid, Cell::occupied,
         [&](const Vec3& x) { return ((x - low).array() < a).any() || ((high - x).array() < a).any(); });
-  box({0.8, 0.8, 0.6}, {1.6, 1.5, 0.7});                                     // table top
-  box({0.8, 0.8, 0}, {0.9, 0.9, 0.7}), box({1.5, 1.4, 0}, {1.6, 1.5, 0.7});  // two legs
-  box({2.7, 0, 0}, {3.2, 1.2, 1.2});                                         // shelf
-  box({2.0, 2.0, 0}, {2.1, 2.1, 1.8});                                       // pillar
+  box({0.8, 0.8, 0.6}, {1.6, 1.5, 0.7});  // table top
+  box({0.8, 0.8, 0}, {0.9, 0.9, 0.7});
+  box({1.5, 1.4, 0}, {1.6, 1.5, 0.7});  // two legs
+  box({2.7, 0, 0}, {3.2, 1.2, 1.2});    // shelf
+  box({2.0, 2.0, 0}, {2.1, 2.1, 1.8});  // pillar
   return grid;
 }
 

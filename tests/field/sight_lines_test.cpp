@@ -61,7 +61,8 @@ TEST(SightLines, HoldEveryColumnCrossedAndMarkThoseThatEveryLineCrosses) {
           ASSERT_TRUE(!crossed || found != crossings.end()) << dx << ' ' << dy << ": " << i << ' ' << j;
           const bool every = found != crossings.end() && found - crossings.begin() < line.must;
           ASSERT_TRUE(crossed || !every) << dx << ' ' << dy << ' ' << y << ": " << i << ' ' << j;
-          may += crossed, must += every;
+          may += crossed;
+          must += every;
         }
     }
   }
@@ -72,14 +73,20 @@ TEST(SightLines, HoldEveryColumnCrossedAndMarkThoseThatEveryLineCrosses) {
 std::uint64_t hidden_by(const Vec3& c, const ColumnOffset& column, int low, int high, std::size_t lane) {
   std::array<double, 8> x{}, y{}, range{};
   std::array<LineFromAbove, 8> lines{};
-  x.fill(1), y.fill(1);
-  x[7 - lane] = c.x(), y[7 - lane] = c.y(), range[7 - lane] = kRange;
+  x.fill(1);
+  y.fill(1);
+  x[7 - lane] = c.x();
+  y[7 - lane] = c.y();
+  range[7 - lane] = kRange;
   make_lines(x.data(), y.data(), range.data(), 8, lines.data());
   std::array<std::uint32_t, 8> line{};
   std::array<std::int32_t, 8> columns_x{}, columns_y{}, lows{}, highs{};
   std::array<std::uint64_t, 8> hidden{};
   line[lane] = static_cast<std::uint32_t>(7 - lane);
-  columns_x[lane] = column.x, columns_y[lane] = column.y, lows[lane] = low, highs[lane] = high;
+  columns_x[lane] = column.x;
+  columns_y[lane] = column.y;
+  lows[lane] = low;
+  highs[lane] = high;
   hide(lines.data(), {line.data(), columns_x.data(), columns_y.data(), lows.data(), highs.data(), hidden.data()}, 8);
   return hidden[lane];
 }

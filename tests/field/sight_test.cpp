@@ -58,7 +58,8 @@ TEST(LineOfSight, EqualsTheClosedBoxTestOfEveryVoxelOnRandomSegments) {
 
 TEST(LineOfSight, DoesNotLeakBetweenTwoVoxelsThatTouchAtAnEdge) {
   Lab lab;
-  lab.block(2, 3, 2), lab.block(3, 2, 2);
+  lab.block(2, 3, 2);
+  lab.block(3, 2, 2);
   EXPECT_FALSE(lab.clear({1.5, 1.5, 2.5}, {4.5, 4.5, 2.5}));
   EXPECT_FALSE(lab.clear({1.5, 1.5, 2.1}, {4.5, 4.5, 2.9}));
   EXPECT_TRUE(lab.clear({1.5, 1.5, 3.5}, {4.5, 4.5, 3.5}));

@@ -33,9 +33,17 @@ double difference(const Mat3& actual, const Mat3& expected) {
 /// cone, a steep decay; and walls seen from above only.
 std::vector<Model> models() {
   Model wide, steep;
-  wide.ground.theta_max = 2.5, wide.ground.r0 = 0.8, wide.ground.l_max = 0.6;
-  wide.corner.phi_max = 2.2, wide.corner.l_max = 2.0, wide.wall.theta_min = 0, wide.wall.k2 = 40;
-  steep.wall.theta_min = 1.5, steep.wall.l_max = 0.8, steep.corner.phi_max = 0.5, steep.ground.theta_max = 0.2;
+  wide.ground.theta_max = 2.5;
+  wide.ground.r0 = 0.8;
+  wide.ground.l_max = 0.6;
+  wide.corner.phi_max = 2.2;
+  wide.corner.l_max = 2.0;
+  wide.wall.theta_min = 0;
+  wide.wall.k2 = 40;
+  steep.wall.theta_min = 1.5;
+  steep.wall.l_max = 0.8;
+  steep.corner.phi_max = 0.5;
+  steep.ground.theta_max = 0.2;
   return {Model{}, wide, steep};
 }
 
@@ -226,7 +234,8 @@ void expect_update_equals_rebuild(const OccupancyGrid& before, const OccupancyGr
     field.fill(whole, 0, whole.block_count());
   };
   DisturbanceField old(before, free_voxels(before)), rebuilt(after, free_voxels(after));
-  store(old, before, free_voxels(before)), store(rebuilt, after, free_voxels(after));
+  store(old, before, free_voxels(before));
+  store(rebuilt, after, free_voxels(after));
   const auto changed = test::changed_box(before, after);
   ASSERT_FALSE(changed.empty());
   const map::VoxelBox columns = affected_columns(after, Model{}, changed);

@@ -89,7 +89,9 @@ Bytes frame(Mutator& mutator) {
       c.sequence = static_cast<std::uint16_t>(mutator.bits());
       c.request = static_cast<std::uint8_t>(mutator.below(6));
       c.has_setpoint = mutator.one_in(2);
-      fill(c.position), fill(c.velocity), fill(c.acceleration);
+      fill(c.position);
+      fill(c.velocity);
+      fill(c.acceleration);
       plain_write_command(&c, wire.data());
       wire.resize(PLAIN_COMMAND_SIZE);
       break;
@@ -97,7 +99,9 @@ Bytes frame(Mutator& mutator) {
     case 1: {
       plain_pose_t p{};
       p.time_ms = static_cast<std::uint32_t>(mutator.bits());
-      fill(p.position), fill(p.attitude), fill(p.velocity_b);
+      fill(p.position);
+      fill(p.attitude);
+      fill(p.velocity_b);
       plain_write_pose(&p, wire.data());
       wire.resize(PLAIN_POSE_SIZE);
       break;
@@ -106,7 +110,10 @@ Bytes frame(Mutator& mutator) {
       plain_state_t s{};
       s.pose_known = mutator.one_in(2);
       s.answered = static_cast<std::uint16_t>(mutator.bits());
-      fill(s.position), fill(s.velocity), fill(s.attitude), fill(s.rates);
+      fill(s.position);
+      fill(s.velocity);
+      fill(s.attitude);
+      fill(s.rates);
       plain_write_state(&s, wire.data());
     }
   }

@@ -27,14 +27,24 @@ log::FlightLog flown(Mutator& mutator) {
     const Vec3 v(0.56 * std::cos(0.7 * t), -0.4 * std::sin(0.5 * t), 0.45 * std::cos(0.9 * t));
     for (int i = 0; i < 3; ++i) {
       const std::string axis(1, static_cast<char>('x' + i));
-      add(axis + "_m", cmd[i] + noise(0.02)), add("v" + axis + "_mps", v[i] + noise(0.05));
-      add("a" + axis + "_mps2", noise(0.3)), add("cmd_" + axis + "_m", cmd[i]);
-      add("cmd_v" + axis + "_mps", v[i]), add("cmd_a" + axis + "_mps2", 0);
+      add(axis + "_m", cmd[i] + noise(0.02));
+      add("v" + axis + "_mps", v[i] + noise(0.05));
+      add("a" + axis + "_mps2", noise(0.3));
+      add("cmd_" + axis + "_m", cmd[i]);
+      add("cmd_v" + axis + "_mps", v[i]);
+      add("cmd_a" + axis + "_mps2", 0);
     }
-    add("qw", 1), add("qx", noise(0.01)), add("qy", noise(0.01)), add("qz", 0);
-    add("thrust", 0.45 + noise(0.02)), add("battery_v", 16 - 0.01 * t), add("temperature_c", 25 + 0.1 * t);
-    for (const char* rotor : {"1", "2", "3", "4"})
-      add(std::string("rpm") + rotor, 12000 + noise(100)), add(std::string("motor") + rotor, 0.5 + noise(0.01));
+    add("qw", 1);
+    add("qx", noise(0.01));
+    add("qy", noise(0.01));
+    add("qz", 0);
+    add("thrust", 0.45 + noise(0.02));
+    add("battery_v", 16 - 0.01 * t);
+    add("temperature_c", 25 + 0.1 * t);
+    for (const char* rotor : {"1", "2", "3", "4"}) {
+      add(std::string("rpm") + rotor, 12000 + noise(100));
+      add(std::string("motor") + rotor, 0.5 + noise(0.01));
+    }
     add("segment", static_cast<double>(k / 60));
   }
   return log;
@@ -93,7 +103,8 @@ TEST(Fuzz, AStudyOfAnyFiniteNumbersEndsWithAVerdict) {
       for (const auto& p : cause.found.parameters)
         EXPECT_TRUE(std::isfinite(p.value) && std::isfinite(p.low) && std::isfinite(p.high))
             << cause.found.form->cause() << ' ' << p.name;
-    ++verdicts, named += result.verdict == StudyVerdict::insufficient ? 0 : 1;
+    ++verdicts;
+    named += result.verdict == StudyVerdict::insufficient ? 0 : 1;
   }
   std::printf("%d verdicts, %d with flights enough\n", verdicts, named);
   EXPECT_GT(named, verdicts / 4);

@@ -51,7 +51,10 @@ std::optional<double> flown(const Vio& vio, std::uint64_t seed, double seconds, 
   vehicle.estimation.position = vio.position;
   OdometryGate gate(vehicle, {std::min(vio.rate_hz, 20.0), 0});
   Trial trial;
-  trial.seed = seed, trial.rate_hz = vio.rate_hz, trial.speed = vio.speed, trial.seconds = seconds;
+  trial.seed = seed;
+  trial.rate_hz = vio.rate_hz;
+  trial.speed = vio.speed;
+  trial.seconds = seconds;
   FlownLoop loop(quad_5in(), trial);
   std::mt19937_64 random(seed + 77);
   std::normal_distribution<double> normal;

@@ -30,11 +30,13 @@ Controller px4() { return {{1.71, 1.71}, {1.8, 1.8}, 0.02, 0, 0.05, {}}; }
 
 FlownLoop::FlownLoop(const Controller& controller, const Trial& trial)
     : controller_(controller), trial_(trial), air_(trial.form, trial.tau_s, trial.bursts, trial.seed) {
-  controller_.feedback_delay += trial.delay, controller_.attitude_lag += trial.lag;
+  controller_.feedback_delay += trial.delay;
+  controller_.attitude_lag += trial.lag;
   controller_.latency += trial.command_delay;
   const Setpoint first = asked(0);
   body_ = {first.p_W, first.v_W, first.a_W};
-  seen_.assign(1, body_), sent_.assign(1, first);
+  seen_.assign(1, body_);
+  sent_.assign(1, first);
 }
 
 // Round and round: each axis at a frequency of its own.
@@ -42,7 +44,8 @@ Setpoint FlownLoop::asked(double t) const {
   Setpoint s;
   const Vec3 turns(0.5, 0.8, 0.3), speed = trial_.speed * Vec3(1, 0.7, 0.2);
   for (int k = 0; k < 3; ++k) {
-    s.p_W[k] = speed[k] / turns[k] * std::sin(turns[k] * t), s.v_W[k] = speed[k] * std::cos(turns[k] * t);
+    s.p_W[k] = speed[k] / turns[k] * std::sin(turns[k] * t);
+    s.v_W[k] = speed[k] * std::cos(turns[k] * t);
     s.a_W[k] = -speed[k] * turns[k] * std::sin(turns[k] * t);
   }
   s.p_W.z() += 1.5;
@@ -86,7 +89,8 @@ void FlownLoop::step() {
                 {r1.p + 2 * r2.p + 2 * r3.p + r4.p, r1.v + 2 * r2.v + 2 * r3.v + r4.v,
                  r1.rotors + 2 * r2.rotors + 2 * r3.rotors + r4.rotors});
   t_ += kStep;
-  seen_.push_front(body_), sent_.push_front(sent_.front());
+  seen_.push_front(body_);
+  sent_.push_front(sent_.front());
   constexpr std::size_t kKept = 200;
   if (seen_.size() > kKept) seen_.pop_back();
   if (sent_.size() > kKept) sent_.pop_back();
@@ -100,7 +104,8 @@ AirTick FlownLoop::tick() {
   const bool at_wall = trial_.walls_only && std::fmod(t_, 10) >= 6;
   AirTick tick;
   tick.now_ns = 20'000'000 * ++ticks_;
-  tick.sigma = at_wall ? kWall : kFreeAir, tick.air = at_wall ? AirClass::wall : AirClass::free_air;
+  tick.sigma = at_wall ? kWall : kFreeAir;
+  tick.air = at_wall ? AirClass::wall : AirClass::free_air;
   tick.command = sent_.front() = asked(t_);
   if (t_ < next_ - kStep / 2) return tick;
   next_ += 1 / trial_.rate_hz;
@@ -114,7 +119,8 @@ Learned fly(const Controller& controller, const Trial& trial) {
   using namespace backwash::adapt;
   InFlightConstants constants;
   constants.controller = controller;
-  constants.gusts.tau_low_s = trial.tau_low_s, constants.gusts.tau_high_s = trial.tau_high_s;
+  constants.gusts.tau_low_s = trial.tau_low_s;
+  constants.gusts.tau_high_s = trial.tau_high_s;
   constants.gusts.mean_horizontal = constants.gusts.mean_vertical = trial.allowed;
   InFlight learnt(constants);
   FlownLoop loop(controller, trial);
@@ -134,8 +140,10 @@ Learned fly(const Controller& controller, const Trial& trial) {
     }
   }
   learned.factor = learnt.factors()[static_cast<std::size_t>(acting)];
-  learned.cause = learnt.cause(acting), learned.calmer = learnt.of(acting).below();
-  learned.beyond = learnt.of(acting).beyond(), learned.promised = learnt.of(acting).promised_beyond();
+  learned.cause = learnt.cause(acting);
+  learned.calmer = learnt.of(acting).below();
+  learned.beyond = learnt.of(acting).beyond();
+  learned.promised = learnt.of(acting).promised_beyond();
   learnt.end();
   learned.air_kept = *std::ranges::max_element(learnt.kept());
   return learned;

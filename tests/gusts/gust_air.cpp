@@ -17,7 +17,9 @@ GustAir::GustAir(Form form, double tau_s, const Bursts& bursts, std::uint64_t se
     : form_(form), bursts_(bursts), tau_(tau_s), rng_(seed) {
   const double excess = std::expm1(bursts.ln_kurtosis), p = bursts.share;
   const double difference = std::sqrt(excess / (p * (1 - p))), calm2 = 1 - p * difference;
-  loud_ = std::sqrt(calm2 + difference), calm_ = std::sqrt(calm2), mean_off_ = bursts.mean_s * (1 - p) / p;
+  loud_ = std::sqrt(calm2 + difference);
+  calm_ = std::sqrt(calm2);
+  mean_off_ = bursts.mean_s * (1 - p) / p;
   for (int turn = 0; turn < 4; ++turn) {  // shorter lags where bursts shorten the correlation
     tune(tau_);
     tau_ *= tau_s / correlation_time();
@@ -45,9 +47,15 @@ void GustAir::tune(double tau_s) {
     }
     double time = 0;  // ∫ρ dt at rates in units of 1/T
     for (const Lag& lag : lags_) time += lag.weight / sum / lag.rate;
-    for (Lag& lag : lags_) lag.weight = std::sqrt(lag.weight / sum), lag.rate *= time / tau_s;
+    for (Lag& lag : lags_) {
+      lag.weight = std::sqrt(lag.weight / sum);
+      lag.rate *= time / tau_s;
+    }
   }
-  for (Lag& lag : lags_) lag.decay = std::exp(-lag.rate * kStep), lag.kick = std::sqrt(1 - lag.decay * lag.decay);
+  for (Lag& lag : lags_) {
+    lag.decay = std::exp(-lag.rate * kStep);
+    lag.kick = std::sqrt(1 - lag.decay * lag.decay);
+  }
 }
 
 double GustAir::correlation_time() const {

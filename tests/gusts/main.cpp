@@ -31,34 +31,80 @@ struct Case {
   const char* name;
   void (*change)(Trial&);
 };
-const std::vector<Case> kModelled{
-    {"no noise", [](Trial&) {}},
-    {"2 mm, 0.02 m/s", [](Trial& t) { t.position_noise = 0.002, t.velocity_noise = 0.02; }},
-    {"5 mm, 0.05 m/s", [](Trial& t) { t.position_noise = 0.005, t.velocity_noise = 0.05; }},
-    {"vibration 3 mm", [](Trial& t) { t.vibration = 0.003; }},
-    {"30 Hz, 1 mm", [](Trial& t) { t.rate_hz = 30, t.position_noise = 0.001; }},
-    {"hover", [](Trial& t) { t.speed = 0; }},
-    {"push as allowed", [](Trial& t) { t.push = t.allowed = 0.05; }},
-    {"heavy tails", [](Trial& t) { t.bursts.ln_kurtosis = 0.4; }}};
-const std::vector<Case> kRough{
-    {"x1.4", [](Trial& t) { t.factor = 1.4; }},
-    {"x2", [](Trial& t) { t.factor = 2; }},
-    {"x4", [](Trial& t) { t.factor = 4; }},
-    {"x16", [](Trial& t) { t.factor = 16; }},
-    {"x2, push as allowed", [](Trial& t) { t.factor = 2, t.push = t.allowed = 0.05; }},
-    {"x2, push allowed", [](Trial& t) { t.factor = 2, t.allowed = 0.05; }},
-    {"x4 from 60 s", [](Trial& t) { t.factor = 4, t.since_s = 60; }},
-    {"x4, 5 mm, 0.05 m/s", [](Trial& t) { t.factor = 4, t.position_noise = 0.005, t.velocity_noise = 0.05; }},
-    {"x4, hover", [](Trial& t) { t.factor = 4, t.speed = 0; }}};
+const std::vector<Case> kModelled{{"no noise", [](Trial&) {}},
+                                  {"2 mm, 0.02 m/s",
+                                   [](Trial& t) {
+                                     t.position_noise = 0.002;
+                                     t.velocity_noise = 0.02;
+                                   }},
+                                  {"5 mm, 0.05 m/s",
+                                   [](Trial& t) {
+                                     t.position_noise = 0.005;
+                                     t.velocity_noise = 0.05;
+                                   }},
+                                  {"vibration 3 mm", [](Trial& t) { t.vibration = 0.003; }},
+                                  {"30 Hz, 1 mm",
+                                   [](Trial& t) {
+                                     t.rate_hz = 30;
+                                     t.position_noise = 0.001;
+                                   }},
+                                  {"hover", [](Trial& t) { t.speed = 0; }},
+                                  {"push as allowed", [](Trial& t) { t.push = t.allowed = 0.05; }},
+                                  {"heavy tails", [](Trial& t) { t.bursts.ln_kurtosis = 0.4; }}};
+const std::vector<Case> kRough{{"x1.4", [](Trial& t) { t.factor = 1.4; }},
+                               {"x2", [](Trial& t) { t.factor = 2; }},
+                               {"x4", [](Trial& t) { t.factor = 4; }},
+                               {"x16", [](Trial& t) { t.factor = 16; }},
+                               {"x2, push as allowed",
+                                [](Trial& t) {
+                                  t.factor = 2;
+                                  t.push = t.allowed = 0.05;
+                                }},
+                               {"x2, push allowed",
+                                [](Trial& t) {
+                                  t.factor = 2;
+                                  t.allowed = 0.05;
+                                }},
+                               {"x4 from 60 s",
+                                [](Trial& t) {
+                                  t.factor = 4;
+                                  t.since_s = 60;
+                                }},
+                               {"x4, 5 mm, 0.05 m/s",
+                                [](Trial& t) {
+                                  t.factor = 4;
+                                  t.position_noise = 0.005;
+                                  t.velocity_noise = 0.05;
+                                }},
+                               {"x4, hover", [](Trial& t) {
+                                  t.factor = 4;
+                                  t.speed = 0;
+                                }}};
 const std::vector<Case> kNotAir{{"load 5 %", [](Trial& t) { t.load = 0.05; }},
                                 {"load 30 %", [](Trial& t) { t.load = 0.3; }},
                                 {"late measurements 0.1 s", [](Trial& t) { t.delay = 0.1; }},
-                                {"the same at 0.3 m/s", [](Trial& t) { t.delay = 0.1, t.speed = 0.3; }},
-                                {"the same in a hover", [](Trial& t) { t.delay = 0.1, t.speed = 0; }},
+                                {"the same at 0.3 m/s",
+                                 [](Trial& t) {
+                                   t.delay = 0.1;
+                                   t.speed = 0.3;
+                                 }},
+                                {"the same in a hover",
+                                 [](Trial& t) {
+                                   t.delay = 0.1;
+                                   t.speed = 0;
+                                 }},
                                 {"late set-points 0.1 s", [](Trial& t) { t.command_delay = 0.1; }},
                                 {"lag 0.15 s", [](Trial& t) { t.lag = 0.15; }},
-                                {"the same at 0.3 m/s", [](Trial& t) { t.lag = 0.15, t.speed = 0.3; }},
-                                {"the same in a hover", [](Trial& t) { t.lag = 0.15, t.speed = 0; }},
+                                {"the same at 0.3 m/s",
+                                 [](Trial& t) {
+                                   t.lag = 0.15;
+                                   t.speed = 0.3;
+                                 }},
+                                {"the same in a hover",
+                                 [](Trial& t) {
+                                   t.lag = 0.15;
+                                   t.speed = 0;
+                                 }},
                                 {"push 0.5 m/s2", [](Trial& t) { t.push = 0.5; }},
                                 {"vibration 3 mm", [](Trial& t) { t.vibration = 0.003; }},
                                 {"gusts of 0.05 s", [](Trial& t) { t.tau_s = 0.05; }}};
@@ -70,8 +116,10 @@ std::vector<Learned> fly_all(const Loop& loop, const Case& flown, std::size_t fl
   const auto work = [&] {
     for (std::size_t k = next++; k < flights; k = next++) {
       Trial trial;
-      trial.form = kForms[k % kForms.size()], trial.seed = seed + k;
-      trial.tau_low_s = 0.14, trial.tau_high_s = 0.16;
+      trial.form = kForms[k % kForms.size()];
+      trial.seed = seed + k;
+      trial.tau_low_s = 0.14;
+      trial.tau_high_s = 0.16;
       trial.tau_s = 0.14 + 0.02 * std::fmod(0.618034 * static_cast<double>(k), 1.0);
       flown.change(trial);
       learned[k] = fly(loop.controller, trial);
@@ -105,11 +153,15 @@ bool modelled(std::size_t flights, std::uint64_t& seed, int jobs) {
     for (const Case& flown : kModelled) {
       const auto learned = fly_all(loop, flown, each, seed, jobs);
       double beyond = 0, promised = 0;
-      for (const auto& l : learned) beyond += l.beyond, promised += l.promised;
+      for (const auto& l : learned) {
+        beyond += l.beyond;
+        promised += l.promised;
+      }
       const std::size_t told = count(learned, [](const auto& l) { return l.alarm_s.has_value(); });
       std::printf("%-14s%-20s%9zu%9zu%11.0f%11.0f%9zu\n", loop.name, flown.name, each, told, beyond, promised,
                   count(learned, [](const auto& l) { return l.calmer.has_value(); }));
-      all += each, alarms += told;
+      all += each;
+      alarms += told;
     }
   const double share = static_cast<double>(alarms) / static_cast<double>(all);
   std::printf("all: %zu of %zu, %.4f, upper 95 %% limit %.4f; asked: at most %.4f: %s\n", alarms, all, share,
@@ -124,8 +176,12 @@ void rough(std::size_t flights, std::uint64_t& seed, int jobs) {
     for (const Case& flown : kRough) {
       std::vector<double> exposed, factors;
       const auto learned = fly_all(loop, flown, flights, seed, jobs);
-      for (const auto& l : learned) exposed.push_back(l.exposed_s.value_or(INFINITY)), factors.push_back(l.factor);
-      std::ranges::sort(exposed), std::ranges::sort(factors);
+      for (const auto& l : learned) {
+        exposed.push_back(l.exposed_s.value_or(INFINITY));
+        factors.push_back(l.factor);
+      }
+      std::ranges::sort(exposed);
+      std::ranges::sort(factors);
       std::printf("%-14s%-22s%7zu%8.1f%8.1f%12.2f%14zu\n", loop.name, flown.name,
                   count(learned, [](const auto& l) { return l.exposed_s.has_value(); }), exposed[flights / 2],
                   exposed[flights * 9 / 10], factors[flights / 2],

@@ -21,7 +21,8 @@ RawLog told(std::int64_t first_ns, int ticks) {
     track::TickInput in;
     in.now_ns = first_ns + n * kTick_ns;
     track::AutopilotFacts::Pose pose;
-    pose.at_ns = in.now_ns, pose.state.p_W = {2e-9 * static_cast<double>(in.now_ns), 1, 2};
+    pose.at_ns = in.now_ns;
+    pose.state.p_W = {2e-9 * static_cast<double>(in.now_ns), 1, 2};
     if (n % 2 == 0) in.autopilot.pose = pose;
     const TickInputRecord row = encode(in).input;
     RawRecord record{{in.now_ns, RecordKind::tick_input, sizeof row}, std::vector<std::uint8_t>(sizeof row)};

@@ -41,8 +41,10 @@ const Eigen::Quaterniond kEnuOfNed(0, std::sqrt(0.5), std::sqrt(0.5), 0), kFluOf
 std::string line(std::initializer_list<double> cells) {
   std::string text;
   char number[32];
-  for (const double v : cells)
-    std::snprintf(number, sizeof number, text.empty() ? "%.16g" : ",%.12g", v), text += number;
+  for (const double v : cells) {
+    std::snprintf(number, sizeof number, text.empty() ? "%.16g" : ",%.12g", v);
+    text += number;
+  }
   return text;
 }
 

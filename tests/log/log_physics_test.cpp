@@ -31,8 +31,10 @@ FlightLog flown() {
       log.columns["a" + axis + "_mps2"].push_back(a[i]);
     }
     const auto q = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3(a + kG * Vec3::UnitZ()));
-    log.columns["qw"].push_back(q.w()), log.columns["qx"].push_back(q.x());
-    log.columns["qy"].push_back(q.y()), log.columns["qz"].push_back(q.z());
+    log.columns["qw"].push_back(q.w());
+    log.columns["qx"].push_back(q.x());
+    log.columns["qy"].push_back(q.y());
+    log.columns["qz"].push_back(q.z());
     log.columns["thrust"].push_back(0.5 * (a.z() + kG) / kG);
     for (const char* name : {"rpm1", "rpm2", "rpm3", "rpm4"}) log.columns[name].push_back(9000);
   }
@@ -87,7 +89,7 @@ TEST(Impossible, ALeapOnAWayBetweenTwoAxesIsNoContradictionButExchangedAxesAre) 
   const auto between = [](FlightLog& log) {
     for (std::size_t k = 0; k < log.t_s.size(); ++k) {
       const double slow = 0.5 * std::sin(0.5 * log.t_s[k]);
-      log.columns["y_m"][k] = 0.3 * log.column("x_m")[k] + slow,
+      log.columns["y_m"][k] = 0.3 * log.column("x_m")[k] + slow;
       log.columns["vy_mps"][k] = 0.3 * log.column("vx_mps")[k] + 0.25 * std::cos(0.5 * log.t_s[k]);
     }
     for (const auto& names : {kA, kQ})

@@ -96,13 +96,16 @@ TopicLog swinging() {
   for (int k = 0; k < 2000; ++k) {
     const double t = 10 + 0.01 * k, pitch = std::atan2(size * w * w * std::sin(w * t), 9.80665);
     attitude.t_s.push_back(t);
-    attitude.columns["q[0]"].push_back(std::cos(pitch / 2)), attitude.columns["q[1]"].push_back(0);
-    attitude.columns["q[2]"].push_back(std::sin(pitch / 2)), attitude.columns["q[3]"].push_back(0);
+    attitude.columns["q[0]"].push_back(std::cos(pitch / 2));
+    attitude.columns["q[1]"].push_back(0);
+    attitude.columns["q[2]"].push_back(std::sin(pitch / 2));
+    attitude.columns["q[3]"].push_back(0);
   }
   for (int k = 0; k < 5000; ++k) {
     const double t = 10 + 0.004 * k, a = -size * w * w * std::sin(w * t);
     force.t_s.push_back(t);
-    force.columns["accelerometer_m_s2[0]"].push_back(0), force.columns["accelerometer_m_s2[1]"].push_back(0);
+    force.columns["accelerometer_m_s2[0]"].push_back(0);
+    force.columns["accelerometer_m_s2[1]"].push_back(0);
     force.columns["accelerometer_m_s2[2]"].push_back(-std::hypot(a, 9.80665));
   }
   log.topics = {position, force, attitude};

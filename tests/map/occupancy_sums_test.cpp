@@ -96,7 +96,8 @@ TEST(OccupancySums, FollowChangesOfTheMap) {
       for (int n = 0; n < 5; ++n) {
         const Index3 v = random_index(random, grid.size(), 0);
         grid.set(v, static_cast<Cell>(random() % 3));
-        low = low.cwiseMin(v), high = high.cwiseMax(v);
+        low = low.cwiseMin(v);
+        high = high.cwiseMax(v);
       }
       sums.update(grid, low, high);
       for (int query = 0; query < 100; ++query) {

@@ -170,7 +170,8 @@ TEST(SeenWindow, HoldsNoMoreThanTheStatedBytesOverAKilometreOfCorridor) {
     seen.freed(air, at);
     most_parts = std::max(most_parts, seen.parts());
     seen.evict({low, low + size - Index3::Ones()});
-    walls = {}, air = {};
+    walls = {};
+    air = {};
     most_bytes = std::max(most_bytes, mallinfo2().uordblks + mallinfo2().hblkhd - before);
   }
   RecordProperty("bytes_over_stated", std::to_string(static_cast<double>(most_bytes) / static_cast<double>(stated)));

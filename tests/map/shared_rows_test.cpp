@@ -50,7 +50,8 @@ TEST(SharedRows, KeepWhatASnapshotHeldWhateverIsWrittenLater) {
         const auto value = static_cast<std::uint16_t>(random());
         rows.own_row(v.y(), v.z())[v.x()] = cells[linear(size, v)] = value;
       });
-      snapshots.push_back(std::move(rows)), expected.push_back(std::move(cells));
+      snapshots.push_back(std::move(rows));
+      expected.push_back(std::move(cells));
       for (std::size_t s = 0; s < snapshots.size(); ++s)
         ASSERT_TRUE(cells_of(snapshots[s]) == expected[s]) << "snapshot " << s << " of " << size.transpose();
     }

@@ -103,7 +103,9 @@ TEST_F(Geometries, RefuseMeshesThatAreDamagedOrEmpty) {
 TEST_F(Geometries, EndInAnAnswerWhateverBytesOfAMeshAreDamaged) {
   std::uint64_t state = 88172645463325252u;
   const auto draw = [&](std::size_t below) {
-    state ^= state << 13, state ^= state >> 7, state ^= state << 17;
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
     return static_cast<std::size_t>(state % below);
   };
   int refusals = 0;

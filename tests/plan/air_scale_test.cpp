@@ -66,7 +66,8 @@ TEST(AirScale, TheClassOfAVoxelIsTheTermThatIsLargestInTheExactModel) {
 
 TEST(AirScale, ABoundGrowsByTheRootOfItsClasssFactorAndTheSteadyPushDoesNot) {
   Model model;
-  model.bound.mean_horizontal = 0.05, model.bound.mean_vertical = 0.02;
+  model.bound.mean_horizontal = 0.05;
+  model.bound.mean_vertical = 0.02;
   const auto calm = build_world(furnished(), model, quad());
   const auto rough = with_air(*calm, kRougher, model);
   const field::DisturbanceField modelled = test::stored_field(*calm, model);

@@ -21,7 +21,10 @@ TEST(RefusedAtOnce, SaysOfAnyGoalWhatTheWorldSays) {
   const auto grid = map::builtin_scene("apartment").value();
   for (const auto method : {reach::Method::tight, reach::Method::paper}) {
     Vehicle vehicle = kVehicle;
-    if (method == reach::Method::paper) vehicle.controller.latency = 0, vehicle.controller.attitude_lag = 0;
+    if (method == reach::Method::paper) {
+      vehicle.controller.latency = 0;
+      vehicle.controller.attitude_lag = 0;
+    }
     const auto world = build_world(grid, kModel, vehicle, method);
     const Vec3 start(3, 4, 1.2), extent = grid.resolution() * grid.size().cast<double>();
     std::mt19937 random(1);

@@ -18,8 +18,10 @@ TEST(World, WithAnIntegratorUpdatedByRegionIsTheWorldBuiltAnew) {
   map::VoxelBox changed;
   for (int k = 1; k < 20; ++k)
     for (int n = 0; n < 8; ++n)
-      for (const Index3& v : {Index3(125 + n, 8, k), Index3(125 + n, 16, k), Index3(133, 8 + n, k)})
-        grid.set(v, map::Cell::occupied), changed.add(v);
+      for (const Index3& v : {Index3(125 + n, 8, k), Index3(125 + n, 16, k), Index3(133, 8 + n, k)}) {
+        grid.set(v, map::Cell::occupied);
+        changed.add(v);
+      }
   const auto before = build_world(hall, Model{}, vehicle), anew = build_world(grid, Model{}, vehicle);
   const auto there = update_world(*before, grid, changed, Model{}), back = update_world(*there, hall, changed, Model{});
   int far = 0, safe = 0;
@@ -27,7 +29,8 @@ TEST(World, WithAnIntegratorUpdatedByRegionIsTheWorldBuiltAnew) {
     const Index3 v = grid.voxel(n);
     ASSERT_EQ(there->hover.safe(v), anew->hover.safe(v)) << v.transpose();
     ASSERT_EQ(back->hover.safe(v), before->hover.safe(v)) << v.transpose();
-    far += v.x() < 60 && before->hover.safe(v) && !anew->hover.safe(v), safe += anew->hover.safe(v);
+    far += v.x() < 60 && before->hover.safe(v) && !anew->hover.safe(v);
+    safe += anew->hover.safe(v);
   }
   EXPECT_GT(far, 10);
   EXPECT_GT(safe, 1000);

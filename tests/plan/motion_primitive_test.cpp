@@ -40,7 +40,8 @@ TEST(Motion, BoundsHoldEverySampleAndAreAttained) {
     Vec3 low = m.position(from), high = low;
     for (int k = 0; k <= 4000; ++k) {
       const Vec3 p = m.position(from + (to - from) * k / 4000);
-      low = low.cwiseMin(p), high = high.cwiseMax(p);
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
     }
     EXPECT_TRUE((box.low.array() <= low.array() + 1e-12).all() && (box.high.array() >= high.array() - 1e-12).all());
     EXPECT_LT((box.low - low).norm() + (box.high - high).norm(), 1e-4);
@@ -146,7 +147,8 @@ TEST(CostToGo, NeverExceedsTheCostOfAMotionThatReachesTheGoal) {
       const double T = time(random);
       const Vec3 u = piece == 3 ? Vec3(-s.v_W / T) : random_vector(random, 1);
       const Motion m = primitive(s, u, T);
-      cost += m.effort() + rho * T, total += T;
+      cost += m.effort() + rho * T;
+      total += T;
       s = m.end();
     }
     ASSERT_LT(s.v_W.norm(), 1e-12);

@@ -194,7 +194,8 @@ TEST(Plan, PolishingNeverCostsMoreThanTheFirstVerifiedTrajectory) {
     };
     const double a = cost(0), b = cost(400);
     EXPECT_LE(b, a * (1 + 1e-9)) << goal.transpose();  // another pace rounds otherwise
-    first += a, polished += b;
+    first += a;
+    polished += b;
   }
   EXPECT_LT(polished, first);
 }

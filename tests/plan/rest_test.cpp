@@ -29,7 +29,8 @@ constexpr Gains kLoops[] = {{"PX4's defaults", 1.71, 1.8, 0.05},
 
 Vehicle vehicle_of(const Gains& gains) {
   Vehicle v = config::load_vehicle("builtin:quad-5in").value();
-  v.controller.kp = {gains.kp, gains.kp}, v.controller.kd = {gains.kd, gains.kd};
+  v.controller.kp = {gains.kp, gains.kp};
+  v.controller.kd = {gains.kd, gains.kd};
   v.controller.attitude_lag = gains.lag;
   return v;
 }
@@ -115,7 +116,8 @@ TEST(Rest, IsHeldUntilTheLoopHasSettled) {
   for (const Gains& gains : kLoops) {
     const reach::Reachability reach(vehicle_of(gains));
     std::vector<Setpoint> commands(3);
-    commands.front().p_W.x() = 1, commands.front().yaw = 2;
+    commands.front().p_W.x() = 1;
+    commands.front().yaw = 2;
     hold_until_settled(reach, commands);
     held.push_back(commands.size() - 1);
     EXPECT_EQ(held.back(), std::max<std::size_t>(2, reach::settling_periods(reach)));

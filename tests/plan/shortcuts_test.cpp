@@ -96,7 +96,8 @@ TEST(Way, OfSingleVoxelsExistsExactlyWhereFacesJoin) {
     for (std::size_t i = 0; i < grid.cell_count(); ++i)
       if (random() % 100 < 62) grid.set(grid.voxel(i), Cell::occupied);
     const Index3 from(1, 1, 1), to(12, 11, 7);
-    grid.set(from, Cell::free), grid.set(to, Cell::free);
+    grid.set(from, Cell::free);
+    grid.set(to, Cell::free);
     const auto region = test::regions(grid, [&](const Index3& v) { return grid.free(v); });
     const SafeSpace space(grid);
     for (std::size_t i = 0; i < grid.cell_count(); i += 7) {
@@ -157,7 +158,8 @@ TEST(Shortened, CostsLessAndStaysClear) {
     if (way.status != Way::Status::found) continue;
     const auto stops = along(view, {from, Vec3::Zero()}, way.points, kLimits);
     const auto motions = shortened(view, stops, kLimits, 64.8);
-    before += cost_of(stops, 64.8), after += cost_of(motions, 64.8);
+    before += cost_of(stops, 64.8);
+    after += cost_of(motions, 64.8);
     EXPECT_LE(cost_of(motions, 64.8), cost_of(stops, 64.8));
     State at{from, Vec3::Zero()};
     for (const Motion& m : motions) {

@@ -175,7 +175,8 @@ TEST(World, OfABuildingUpdatedByRegionIsTheOneBuiltAnew) {
     for (int n = 0; n < 1000; ++n) {  // a crate of which a scan sees parts
       const Index3 v = low + Index3(n % 10, n / 10 % 10, n / 100);
       if (!grid.free(v) || random() % 4 == 0) continue;
-      grid.set(v, map::Cell::occupied), changed.add(v);
+      grid.set(v, map::Cell::occupied);
+      changed.add(v);
     }
     const auto updated = update_world(*before, grid, changed, Model{});
     const auto anew = build_world(grid, Model{}, vehicle_5in());
@@ -201,7 +202,10 @@ TEST(World, UpdatedByRegionIsTheWorldBuiltAnewForAWideVehicleToo) {
   map::OccupancyGrid grid(Vec3::Zero(), 0.1, Index3(70, 50, 30), map::Cell::free);
   const auto before = build_world(grid, model, vehicle);
   map::VoxelBox changed;
-  for (int k = 0; k < 30; ++k) grid.set({20, 25, k}, map::Cell::occupied), changed.add({20, 25, k});
+  for (int k = 0; k < 30; ++k) {
+    grid.set({20, 25, k}, map::Cell::occupied);
+    changed.add({20, 25, k});
+  }
   const auto anew = build_world(grid, model, vehicle);
   const auto updated = update_world(*before, grid, changed, model);
   int far = 0;
@@ -230,7 +234,8 @@ TEST(World, OfAPartSaysWhatTheWholeOneSaysThere) {
   std::size_t safe = 0, elsewhere = 0;
   for (const Vec3& corner : {Vec3(0, 0, 0), Vec3(1.7, 1.3, 0), Vec3(4, 2.5, 0)}) {
     Index3 low = grid.index(corner).cwiseMax(0), high = (low + Index3(35, 30, 0)).cwiseMin(last);
-    low.z() = 0, high.z() = last.z();
+    low.z() = 0;
+    high.z() = last.z();
     const auto part = build_part(grid, {low, high}, Model{}, vehicle_5in());
     for (std::size_t n = 0; n < part->grid.cell_count(); ++n) {
       const Index3 v = part->grid.voxel(n);
@@ -243,7 +248,8 @@ TEST(World, OfAPartSaysWhatTheWholeOneSaysThere) {
         const Vec3 p_W = part->grid.center(v);
         ASSERT_LT((p_W - whole->grid.center(low + v)).norm(), 1e-9);
       }
-      safe += part->hover.safe(v), elsewhere += whole->hover.safe(low + v) && !part->hover.safe(v);
+      safe += part->hover.safe(v);
+      elsewhere += whole->hover.safe(low + v) && !part->hover.safe(v);
     }
   }
   EXPECT_GT(safe, 2000u);

@@ -31,7 +31,8 @@ void expect_limited(const std::vector<Setpoint>& commands, const YawStart& start
     const double next = (c.yaw - yaw) / kControlPeriod;
     EXPECT_LE(std::abs(next), std::max(limits.rate, std::abs(start.rate)) + 1e-9);
     EXPECT_LE(std::abs(next - rate) / kControlPeriod, limits.acceleration + 1e-6);
-    yaw = c.yaw, rate = next;
+    yaw = c.yaw;
+    rate = next;
   }
   EXPECT_LE(std::abs(rate), limits.acceleration * kControlPeriod + 1e-9);  // at rest in the end
 }

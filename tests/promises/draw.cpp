@@ -30,14 +30,18 @@ bool stable(const Plant& plant) {
 void draw_gains(Random& random, double& kp, double& kd) {
   switch (random.whole(0, 3)) {
     case 0:  // PX4's defaults
-      kp = 1.71, kd = 1.8;
+      kp = 1.71;
+      kd = 1.8;
       break;
     case 1:  // its cascade
-      kd = random.magnitude(0.3, 20), kp = kd * random.magnitude(0.1, 20);
+      kd = random.magnitude(0.3, 20);
+      kp = kd * random.magnitude(0.1, 20);
       break;
     default:  // slow ones are dear: N of docs/model.md 5.2-2 grows with k_d/k_p
-      do kp = random.magnitude(0.1, 200), kd = random.magnitude(0.2, 100);
-      while (kp < 0.3 * kd && !random.chance(0.03));
+      do {
+        kp = random.magnitude(0.1, 200);
+        kd = random.magnitude(0.2, 100);
+      } while (kp < 0.3 * kd && !random.chance(0.03));
   }
 }
 
@@ -95,7 +99,8 @@ DrawnVehicle draw_vehicle(Random& random, bool integrator, bool sampled) {
   drawn.latency = random.chance(0.2) ? 0 : random.whole(0, longest);
   int delay = random.chance(0.3) ? 0 : static_cast<int>(random.magnitude(1, longest));
   c.attitude_lag = random.chance(0.2) ? 0 : random.magnitude(1e-3, 1);
-  draw_gains(random, c.kp.horizontal, c.kd.horizontal), draw_gains(random, c.kp.vertical, c.kd.vertical);
+  draw_gains(random, c.kp.horizontal, c.kd.horizontal);
+  draw_gains(random, c.kp.vertical, c.kd.vertical);
   const auto gain = [&] { return integrator ? random.magnitude(0.05, 20) : 0.0; };
   c.velocity_integrator = {gain(), gain()};
   const auto may_fly = [&] {
@@ -111,7 +116,8 @@ DrawnVehicle draw_vehicle(Random& random, bool integrator, bool sampled) {
         c.attitude_lag /= 2;
         break;
       case 2:
-        c.velocity_integrator.horizontal /= 2, c.velocity_integrator.vertical /= 2;
+        c.velocity_integrator.horizontal /= 2;
+        c.velocity_integrator.vertical /= 2;
         break;
       default:
         for (auto [kp, kd] : {std::pair(&c.kp.horizontal, &c.kd.horizontal), {&c.kp.vertical, &c.kd.vertical}})
@@ -122,7 +128,8 @@ DrawnVehicle draw_vehicle(Random& random, bool integrator, bool sampled) {
   v.limits = {.v_max = random.magnitude(0.2, 20), .a_max = random.magnitude(0.2, 30)};
   v.initial_error = {.position = random.chance(0.2) ? 0 : random.magnitude(1e-3, 1),
                      .velocity = random.chance(0.2) ? 0 : random.magnitude(1e-3, 5)};
-  v.body.radius = random.uniform(0.05, 0.3), v.body.diagonal_radius = v.body.radius;
+  v.body.radius = random.uniform(0.05, 0.3);
+  v.body.diagonal_radius = v.body.radius;
   v.estimation.position = random.uniform(0, 0.05);
   return drawn;
 }
@@ -131,13 +138,24 @@ DrawnModel draw_model(Random& random, bool gusts) {
   DrawnModel drawn;
   Model& m = drawn.model;
   const auto scale = [&](double& amplitude) { amplitude *= gusts ? random.magnitude(0.1, 10) : 0; };
-  scale(m.base.horizontal), scale(m.base.vertical), scale(m.ground.lambda.horizontal), scale(m.ground.lambda.vertical);
-  scale(m.ground.k1.horizontal), scale(m.ground.k1.vertical), scale(m.corner.lambda.normal);
-  scale(m.corner.lambda.tangential), scale(m.corner.lambda.vertical), scale(m.wall.k1.normal);
-  scale(m.wall.k1.tangential), scale(m.wall.k1.vertical);
-  m.ground.l_max = random.uniform(0.3, 2), m.ground.l_footprint_max = random.uniform(0.3, 4);
-  m.corner.l_max = random.uniform(0.3, 1.5), m.wall.l_max = random.uniform(0.3, 1.5);
-  m.bound.kappa = random.uniform(1, 4), m.bound.tau_w = random.uniform(0.05, 0.5);
+  scale(m.base.horizontal);
+  scale(m.base.vertical);
+  scale(m.ground.lambda.horizontal);
+  scale(m.ground.lambda.vertical);
+  scale(m.ground.k1.horizontal);
+  scale(m.ground.k1.vertical);
+  scale(m.corner.lambda.normal);
+  scale(m.corner.lambda.tangential);
+  scale(m.corner.lambda.vertical);
+  scale(m.wall.k1.normal);
+  scale(m.wall.k1.tangential);
+  scale(m.wall.k1.vertical);
+  m.ground.l_max = random.uniform(0.3, 2);
+  m.ground.l_footprint_max = random.uniform(0.3, 4);
+  m.corner.l_max = random.uniform(0.3, 1.5);
+  m.wall.l_max = random.uniform(0.3, 1.5);
+  m.bound.kappa = random.uniform(1, 4);
+  m.bound.tau_w = random.uniform(0.05, 0.5);
   m.bound.mean_horizontal = gusts && random.chance(0.5) ? 0 : random.uniform(0.01, 0.3);
   m.bound.mean_vertical = gusts && random.chance(0.5) ? 0 : random.uniform(0.01, 0.3);
   if (gusts && random.chance(0.5))
@@ -153,7 +171,10 @@ map::VoxelBox draw_box(Random& random, map::OccupancyGrid& grid, map::Cell cell,
   }
   map::VoxelBox changed;
   map::for_each_voxel(map::common(box, map::all_of(grid.size())), [&](const Index3& v) {
-    if (grid.at(v) != cell) grid.set(v, cell), changed.add(v);
+    if (grid.at(v) != cell) {
+      grid.set(v, cell);
+      changed.add(v);
+    }
   });
   return changed;
 }
@@ -170,8 +191,10 @@ map::OccupancyGrid draw_map(Random& random, const Index3& least, const Index3& m
       for (int j = 0; j < size.y(); ++j) grid.set({i, j, 0}, map::Cell::occupied);
   if (!window) return grid;
   Index3 low, high;
-  for (int axis = 0; axis < 3; ++axis)
-    low[axis] = random.whole(0, size[axis] / 4), high[axis] = size[axis] - 1 - random.whole(0, size[axis] / 4);
+  for (int axis = 0; axis < 3; ++axis) {
+    low[axis] = random.whole(0, size[axis] / 4);
+    high[axis] = size[axis] - 1 - random.whole(0, size[axis] / 4);
+  }
   map::for_each_voxel(map::all_of(size), [&](const Index3& v) {
     if (!map::VoxelBox{low, high}.contains(v)) grid.set(v, map::Cell::unknown);
   });

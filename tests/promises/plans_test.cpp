@@ -46,7 +46,8 @@ TEST(Promises, EveryPrismOfAPlanIsAsClearAsClaimed) {
       const Vec3 start = draw_place(random, *world, places), goal = draw_place(random, *world, places);
       const auto plan = plan::plan(*world, {{start, Vec3::Zero()}, {start}}, goal, options);
       if (plan.status != plan::PlanStatus::ok) continue;
-      ++found, ++planned;
+      ++found;
+      ++planned;
       demand_at_most(-plan.metrics.min_clearance_m, 0, "a plan that is not clear");
       demand_clear(*world, obstacles, plan.tube, plan.metrics.min_clearance_m);
     }

@@ -35,7 +35,8 @@ class Place {
         double share = 0;
         for (int n = j * plant.per_period + 1; n <= (j + 1) * plant.per_period; ++n)
           share += std::abs(answer.push[0][at(n)]);
-        share_[vertical].push_back(share), total_[vertical] += share;
+        share_[vertical].push_back(share);
+        total_[vertical] += share;
         first_[vertical].push_back(std::hypot(first.position * answer.from_position[at(j * plant.per_period)],
                                               first.velocity * answer.from_velocity[at(j * plant.per_period)]));
       }
@@ -156,7 +157,11 @@ TEST(Promises, WhereItMayRestTheWorstErrorOfHalfAMinuteIsClear) {
       const auto clear = [&](const reach::ReachTube& tube) { return plan::tube_clearance(world, tube); };
       for (const auto& stop : plan::verified_stops(world, start, plan.commands.front(), plan.commands, 0,
                                                    plan.commands.size() / 8 + 1, clear))
-        if (found < kStops) demand_stop(place, plan, start, stop), ++found, ++stops;
+        if (found < kStops) {
+          demand_stop(place, plan, start, stop);
+          ++found;
+          ++stops;
+        }
     }
   });
   EXPECT_EQ(stops, kWorlds * kStops);

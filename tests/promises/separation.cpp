@@ -61,7 +61,8 @@ double hull_to_box(const std::vector<Vec3>& hull, const Vec3& low, const Vec3& h
     if (norm < 1e-9) return 0;
     const Vec3 next = farthest(x);
     if (norm - next.dot(x) / norm < 1e-10) return norm;  // no plane lies farther
-    kept.push_back(next), weight.push_back(0);
+    kept.push_back(next);
+    weight.push_back(0);
     for (;;) {
       const Eigen::VectorXd to = nearest_of_affine(kept);
       if (to.size() == 0) return std::max(0.0, next.dot(x) / norm);  // rounding: a distance that surely is
@@ -73,9 +74,10 @@ double hull_to_box(const std::vector<Vec3>& hull, const Vec3& low, const Vec3& h
       for (std::size_t i = 0; i < kept.size(); ++i) weight[i] += share * (to[static_cast<Eigen::Index>(i)] - weight[i]);
       if (share >= 1) break;
       for (std::size_t i = kept.size(); i-- > 0;)
-        if (weight[i] <= 1e-14)
-          kept.erase(kept.begin() + static_cast<std::ptrdiff_t>(i)),
-              weight.erase(weight.begin() + static_cast<std::ptrdiff_t>(i));
+        if (weight[i] <= 1e-14) {
+          kept.erase(kept.begin() + static_cast<std::ptrdiff_t>(i));
+          weight.erase(weight.begin() + static_cast<std::ptrdiff_t>(i));
+        }
     }
     x.setZero();
     for (std::size_t i = 0; i < kept.size(); ++i) x += weight[i] * kept[i];
@@ -99,7 +101,10 @@ Obstacles::Obstacles(const map::OccupancyGrid& grid) : edge_(grid.resolution()) 
 
 double Obstacles::distance(const std::vector<Vec3>& hull, double limit) const {
   Vec3 low = hull.front(), high = low;
-  for (const Vec3& p : hull) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  for (const Vec3& p : hull) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
   double nearest = limit;
   for (const Vec3& corner : low_) {
     const Vec3 gap = (corner - high).cwiseMax(low - corner - Vec3::Constant(edge_)).cwiseMax(0.0);

@@ -19,9 +19,11 @@ class Commanded {
       Lanes off, a;
       for (int lane = 0; lane < Motions::kLanes; ++lane) {
         const Vec3 n = unit(d[static_cast<std::size_t>(lane)]);
-        off[lane] = plant.kp * n.dot(s.p_W) + plant.kd * n.dot(s.v_W), a[lane] = n.dot(s.a_W);
+        off[lane] = plant.kp * n.dot(s.p_W) + plant.kd * n.dot(s.v_W);
+        a[lane] = n.dot(s.a_W);
       }
-      off_.push_back(off), a_.push_back(a);
+      off_.push_back(off);
+      a_.push_back(a);
     };
     add(c.previous);
     for (const Setpoint& s : c.commands) add(s);
@@ -44,7 +46,8 @@ Motions started(const Case& c, const Plant& plant, const Attacks& attacks) {
     const Attack& attack = attacks[static_cast<std::size_t>(lane)];
     const Vec3 n = unit(attack.d);
     const double p0 = n.dot(c.start.p_W), v0 = n.dot(c.start.v_W);
-    p[lane] = p0 + attack.p0, v[lane] = v0 + attack.v0;
+    p[lane] = p0 + attack.p0;
+    v[lane] = v0 + attack.v0;
     a[lane] = n.dot(c.previous.a_W) + plant.kp * (n.dot(c.previous.p_W) - p0) + plant.kd * (n.dot(c.previous.v_W) - v0);
   }
   return {plant, p, v, a};
@@ -71,7 +74,8 @@ void draw_commands(Case& c, Random& random, bool still) {
     for (int axis = 0; axis < 3; ++axis)
       if (std::abs(s.v_W[axis] + kControlPeriod * a[axis]) > limits.v_max) s.a_W[axis] = a[axis] = 0;
     c.commands.push_back(s);
-    s.p_W += kControlPeriod * (s.v_W + kControlPeriod / 2 * s.a_W), s.v_W += kControlPeriod * s.a_W;
+    s.p_W += kControlPeriod * (s.v_W + kControlPeriod / 2 * s.a_W);
+    s.v_W += kControlPeriod * s.a_W;
   }
 }
 
@@ -130,8 +134,10 @@ Attack worst(const Case& c, const Answer& answer, Direction d, int to, Random& r
   const auto& first = c.drawn->vehicle.vehicle.initial_error;
   const auto at = static_cast<std::size_t>(to);
   const double p = first.position * answer.from_position[at], v = first.velocity * answer.from_velocity[at];
-  if (const double norm = std::hypot(p, v); norm > 0)
-    attack.p0 = first.position * p / norm, attack.v0 = first.velocity * v / norm;
+  if (const double norm = std::hypot(p, v); norm > 0) {
+    attack.p0 = first.position * p / norm;
+    attack.v0 = first.velocity * v / norm;
+  }
   for (int i = 0; i < c.steps(); ++i)
     attack.sign.push_back(i < to ? (answer.at(i, to) < 0 ? -1 : 1) : random.uniform(-1, 1));
   return attack;
@@ -142,7 +148,10 @@ Attack switching(const Case& c, Direction d, Random& random) {
   const double turn = random.uniform(0, 2 * std::numbers::pi), rate = random.magnitude(1e-3, 0.5);
   Attack attack{d, first.position * std::cos(turn), first.velocity * std::sin(turn), {}};
   double sign = 1;
-  for (int i = 0; i < c.steps(); ++i) attack.sign.push_back(sign), sign = random.chance(rate) ? -sign : sign;
+  for (int i = 0; i < c.steps(); ++i) {
+    attack.sign.push_back(sign);
+    sign = random.chance(rate) ? -sign : sign;
+  }
   return attack;
 }
 

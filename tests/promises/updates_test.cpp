@@ -20,8 +20,10 @@ void demand_same_boxes(const plan::World& a, const plan::World& b, Random& rando
   const Index3 size = a.grid.size();
   for (int n = 0; n < 200; ++n) {
     Index3 low, high;
-    for (int axis = 0; axis < 3; ++axis)
-      low[axis] = random.whole(0, size[axis] - 1), high[axis] = low[axis] + random.whole(0, 12);
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = random.whole(0, size[axis] - 1);
+      high[axis] = low[axis] + random.whole(0, 12);
+    }
     demand_same(a.bounds.max_over_voxels(low, high).w == b.bounds.max_over_voxels(low, high).w, "max over a box", low);
     const Vec3 push = random.within(Vec3::Constant(-0.3), Vec3::Constant(0.3)), v = 3 * push;
     demand_same(a.bounds.max_about_voxels(push, v, low, high).w == b.bounds.max_about_voxels(push, v, low, high).w,
@@ -80,8 +82,10 @@ TEST(Promises, AnUpdatedWorldIsTheOneBuiltAnew) {
         for (int speck = random.whole(0, 3); speck > 0; --speck) {
           const Index3 v =
               grid.voxel(static_cast<std::size_t>(random.whole(0, static_cast<int>(grid.cell_count()) - 1)));
-          if (changed.empty() || (v - changed.low).cwiseAbs().maxCoeff() < 20)
-            grid.set(v, static_cast<map::Cell>(random.whole(0, 2))), changed.add(v);
+          if (changed.empty() || (v - changed.low).cwiseAbs().maxCoeff() < 20) {
+            grid.set(v, static_cast<map::Cell>(random.whole(0, 2)));
+            changed.add(v);
+          }
         }
         world = plan::update_world(*world, grid, changed, air.model);
         demand_same_worlds(*world, *anew(grid), random);

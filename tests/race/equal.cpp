@@ -40,10 +40,12 @@ void add(Flight flight, const plan::Plan& plan, const Vec3& start_W, const Place
   for (std::size_t k = 0; k < plan.commands.size(); ++k) {
     flight.fly(plan.commands[k]);
     const Vec3 p = flight.truth().p_W;
-    d.squares += (p - plan.tube[k + 1].center.p_W).cwiseAbs2(), ++d.samples;
+    d.squares += (p - plan.tube[k + 1].center.p_W).cwiseAbs2();
+    ++d.samples;
     touched = touched || place.distance.exact(place.grid, p) < radius;
   }
-  d.touched += touched, ++d.flights;
+  d.touched += touched;
+  ++d.flights;
 }
 
 enum class As { simulated, fine, raced };
@@ -65,8 +67,12 @@ void compare(const Place& place, const Vehicle& vehicle, As as, const std::vecto
       }
   });
   Deviations all;
-  for (const auto& d : each)
-    all.squares += d.squares, all.samples += d.samples, all.touched += d.touched, all.flights += d.flights;
+  for (const auto& d : each) {
+    all.squares += d.squares;
+    all.samples += d.samples;
+    all.touched += d.touched;
+    all.flights += d.flights;
+  }
   const Vec3 sd = (all.squares / all.samples).cwiseSqrt();
   constexpr const char* kNames[] = {"core/sim", "1 ms", "raced"};
   std::printf("%s,%s,%d,%d,%.4f,%.4f,%.4f\n", vehicle.name.c_str(), kNames[static_cast<int>(as)], all.flights,

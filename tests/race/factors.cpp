@@ -204,13 +204,16 @@ void print_table(const Place& place, const Vehicle& vehicle, const std::vector<T
         ok = ok && look.distance[k] - vehicle.body.radius > clearance[k];
         if (look.distance[k] < kNear) now.push_back(clearance[k]);
       }
-      ++flights, accepted += ok, touched += ok ? look.touched : 0;
+      ++flights;
+      accepted += ok;
+      touched += ok ? look.touched : 0;
     }
     if (base.empty()) base = now;
     for (std::size_t k = 0; k < now.size(); ++k) ratios.push_back(now[k] / base[k]);
     const auto median = [](std::vector<double> x) {
       const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-      return std::nth_element(x.begin(), middle, x.end()), *middle;
+      std::nth_element(x.begin(), middle, x.end());
+      return *middle;
     };
     std::printf("%s,%s,%s,%.4f,%.3f,%d,%d,%d\n", place.name.c_str(), vehicle.name.c_str(), row.name, median(now),
                 median(ratios), accepted, flights, touched);

@@ -43,11 +43,16 @@ void Flown::fly(const Setpoint& command) {
   const double share = 0.25 * vehicle_.estimation.position / std::sqrt(3.0);
   std::uniform_real_distribution<double> uniform(-share, share);
   std::normal_distribution<double> normal(0, 0.01);
-  for (int axis = 0; axis < 3; ++axis) off.p_W[axis] += uniform(random_), off.v_W[axis] += normal(random_);
+  for (int axis = 0; axis < 3; ++axis) {
+    off.p_W[axis] += uniform(random_);
+    off.v_W[axis] += normal(random_);
+  }
   felt_.setZero();
   for (int i = 0; i < steps_; ++i, ++step_) {
-    while (!in_transit_.empty() && in_transit_.front().first <= step_)
-      active_ = in_transit_.front().second, in_transit_.pop_front();
+    while (!in_transit_.empty() && in_transit_.front().first <= step_) {
+      active_ = in_transit_.front().second;
+      in_transit_.pop_front();
+    }
     State believed{truth_.p_W + off.p_W, truth_.v_W + off.v_W};
     if (!late_.empty()) {
       late_.push_back(believed);
@@ -90,7 +95,11 @@ std::pair<Vec3, Vec3> hover_disturbance(const map::OccupancyGrid& grid, const Ve
   int n = 0;
   for (int k = 0; k < 1100; ++k) {
     flight.fly(hold);
-    if (k >= 100) sum += flight.felt(), squares += flight.felt().cwiseAbs2(), ++n;
+    if (k >= 100) {
+      sum += flight.felt();
+      squares += flight.felt().cwiseAbs2();
+      ++n;
+    }
   }
   return {sum / n, squares / n - (sum / n).cwiseAbs2()};
 }

@@ -93,9 +93,13 @@ Followed followed(const std::vector<Tracked>& all, std::size_t without, std::siz
         for (std::size_t k = 30; n != without && k + 10 < all[n].size(); ++k)
           take(n, causes(all[n], axis, k - late), slope(all[n].v[axis], k));
     };
-    each([&](std::size_t, const Eigen::Vector4d& x, double a) { A += x * x.transpose(), b += a * x; });
+    each([&](std::size_t, const Eigen::Vector4d& x, double a) {
+      A += x * x.transpose();
+      b += a * x;
+    });
     Followed now;
-    now.gains = A.ldlt().solve(b), now.lag = 0.01 * static_cast<double>(late);
+    now.gains = A.ldlt().solve(b);
+    now.lag = 0.01 * static_cast<double>(late);
     std::vector<Samples> left(all.size());
     each([&](std::size_t n, const Eigen::Vector4d& x, double a) { left[n].push_back(a - now.gains.dot(x)); });
     double squares = 0, later = 0, count = 0;
@@ -103,10 +107,14 @@ Followed followed(const std::vector<Tracked>& all, std::size_t without, std::siz
       double mean = 0;
       for (const double x : w) mean += x / static_cast<double>(w.size());
       now.mean = std::max(now.mean, std::abs(mean));
-      for (std::size_t k = 0; k + 10 < w.size(); ++k)
-        squares += std::pow(w[k] - mean, 2), later += (w[k] - mean) * (w[k + 10] - mean), ++count;
+      for (std::size_t k = 0; k + 10 < w.size(); ++k) {
+        squares += std::pow(w[k] - mean, 2);
+        later += (w[k] - mean) * (w[k + 10] - mean);
+        ++count;
+      }
     }
-    now.variance = squares / count, now.tau_w = 0.1 / std::max(0.2, -std::log(std::max(1e-3, later / squares)));
+    now.variance = squares / count;
+    now.tau_w = 0.1 / std::max(0.2, -std::log(std::max(1e-3, later / squares)));
     if (now.variance < best.variance) best = now;
   }
   return best;
@@ -121,7 +129,8 @@ Samples error_of(const Tracked& f, const Followed& loop, std::size_t axis) {
     e.push_back(f.p[axis][k] - p);
     const double u = loop.gains.dot(Eigen::Vector4d(f.to[axis][k] - p, slope(f.to[axis], k), -v, 1));
     a = u + kept * (a - u);
-    p += 0.01 * v + 0.5e-4 * a, v += 0.01 * a;
+    p += 0.01 * v + 0.5e-4 * a;
+    v += 0.01 * a;
   }
   e.erase(e.begin(), e.begin() + 100);  // the lag's own start
   return e;
@@ -140,7 +149,8 @@ void print_exits(const char* data, const std::string& flight, char axis, const s
           steady + sigma * reach::exit_level(turn, std::numeric_limits<double>::infinity(), kPromised[n]);
       for (std::size_t k = 0; k < e.size(); ++k) {
         const bool out = std::abs(e[k]) > level;
-        spent[n] += out, exits[n] += out && (k == 0 || std::abs(e[k - 1]) <= level);
+        spent[n] += out;
+        exits[n] += out && (k == 0 || std::abs(e[k - 1]) <= level);
       }
     }
   }
@@ -220,14 +230,23 @@ void judge_hovers(const char* data, const std::vector<Hover>& all) {
         if (m == n || all[m].vehicle != all[n].vehicle || all[m].pieces[axis].empty()) continue;
         double variance = 0, rate = 0, count = 0;
         for (const Samples& e : all[m].pieces[axis])
-          for (std::size_t k = 4; k + 4 < e.size(); ++k)
-            variance += e[k] * e[k], rate += std::pow(slope(e, k), 2), ++count;
-        if (count > 0) variances.push_back(variance / count), rates.push_back(rate / variance);
+          for (std::size_t k = 4; k + 4 < e.size(); ++k) {
+            variance += e[k] * e[k];
+            rate += std::pow(slope(e, k), 2);
+            ++count;
+          }
+        if (count > 0) {
+          variances.push_back(variance / count);
+          rates.push_back(rate / variance);
+        }
       }
       const auto flights = static_cast<double>(variances.size());
       if (flights == 0) continue;
       double mean = 0, turn = 0, log_mean = 0, scatter = 0;
-      for (const double v : variances) mean += v / flights, log_mean += std::log(v) / flights;
+      for (const double v : variances) {
+        mean += v / flights;
+        log_mean += std::log(v) / flights;
+      }
       for (const double v : variances) scatter += std::pow(std::log(v) - log_mean, 2) / std::max(1.0, flights - 1);
       for (const double r : rates) turn += r / flights;
       const auto& pieces = all[n].pieces[axis];

@@ -70,7 +70,8 @@ Trajectory along(const std::string& by, double length, double v_max, const std::
   Trajectory result{by, "places", v_max, {}};
   for (double t = kControlPeriod; t < duration + kControlPeriod; t += kControlPeriod) {
     Setpoint s;
-    s.p_W = at(t), s.v_W = (at(t + d) - at(t - d)) / (2 * d);
+    s.p_W = at(t);
+    s.v_W = (at(t + d) - at(t - d)) / (2 * d);
     s.a_W = (at(t + d) - 2 * at(t) + at(t - d)) / (d * d);
     result.commands.push_back(s);
   }
@@ -92,7 +93,10 @@ std::vector<Trajectory> rivals(const std::string& folder) {
     std::getline(in, line);
     while (std::getline(in, line)) {
       const Piece piece = read_piece(line, pair);
-      if (pair != before && !pieces.empty()) all.push_back(sampled(pieces)), pieces.clear();
+      if (pair != before && !pieces.empty()) {
+        all.push_back(sampled(pieces));
+        pieces.clear();
+      }
       pieces.push_back(piece);
       before = pair;
     }

@@ -57,7 +57,10 @@ TEST(RealTime, StepsOfCentreAndSetsDoNotAllocate) {
 TEST(RealTime, PushesAndBoundsOfAnExtendedModelDoNotAllocate) {
   map::OccupancyGrid grid(Vec3::Zero(), 0.1, Index3(12, 12, 12), map::Cell::free);
   for (int i = 0; i < 12; ++i)
-    for (int j = 0; j < 12; ++j) grid.set({i, j, 11}, map::Cell::occupied), grid.set({i, 0, j}, map::Cell::occupied);
+    for (int j = 0; j < 12; ++j) {
+      grid.set({i, j, 11}, map::Cell::occupied);
+      grid.set({i, 0, j}, map::Cell::occupied);
+    }
   std::vector<std::size_t> voxels;
   for (std::size_t n = 0; n < grid.cell_count(); ++n)
     if (grid.at(n) == map::Cell::free) voxels.push_back(n);

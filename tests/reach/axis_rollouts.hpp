@@ -69,7 +69,9 @@ class AxisRollouts {
     const Batch middle_p = (p_ + p) / 2 + h_ / 8 * (v_ - v);
     const Batch middle_v = (v_ + v) / 2 + h_ / 8 * (k1.v - slope(2, p, v, a).v);
     past_.push_back({feedback(p_, v_), feedback(middle_p, middle_v), feedback(p, v)});
-    p_ = p, v_ = v, a_ = a;
+    p_ = p;
+    v_ = v;
+    a_ = a;
   }
 
  private:

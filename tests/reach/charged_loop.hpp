@@ -30,7 +30,8 @@ class Loop1 {
     const double wanted = a_cmd + off + held;
     held += kEuler * axis_.velocity_integrator / axis_.kd * off;
     a += kEuler * (wanted - a) / axis_.attitude_lag;
-    p += kEuler * (v + kEuler / 2 * (a + w)), v += kEuler * (a + w);
+    p += kEuler * (v + kEuler / 2 * (a + w));
+    v += kEuler * (a + w);
   }
   double p = 0, v = 0, a = 0, held = 0;
 
@@ -44,7 +45,8 @@ inline Vehicle vehicle_of(double integrator) {
   Vehicle vehicle;
   vehicle.controller.kp = {kAxis.kp, 4};
   vehicle.controller.kd = {kAxis.kd, 4};
-  vehicle.controller.feedback_delay = kAxis.feedback_delay, vehicle.controller.attitude_lag = kAxis.attitude_lag;
+  vehicle.controller.feedback_delay = kAxis.feedback_delay;
+  vehicle.controller.attitude_lag = kAxis.attitude_lag;
   vehicle.controller.velocity_integrator = {integrator, 5 * integrator};
   vehicle.body.radius = 0.1;
   vehicle.limits = {.v_max = 1, .a_max = 1};

@@ -72,7 +72,10 @@ TEST(ErrorCovariance, OfALaggingAndDelayedLoopEqualsTheDoubleIntegralOfItsImpuls
       AxisRollouts motion(axis, false, kH, Eigen::ArrayXd::Zero(1), Eigen::ArrayXd::Zero(1));
       motion.step(Eigen::ArrayXd::Constant(1, 1 / kH));
       std::vector<double> g{motion.p()[0]};
-      for (int i = 0; i < 4000; ++i) motion.step(Eigen::ArrayXd::Zero(1)), g.push_back(motion.p()[0]);
+      for (int i = 0; i < 4000; ++i) {
+        motion.step(Eigen::ArrayXd::Zero(1));
+        g.push_back(motion.p()[0]);
+      }
       // ∫∫ = 2 ∫ g(u) y(u) du with y the past of g, filtered by 1/τ.
       double past = 0, sum = 0;
       for (const double x : g) {

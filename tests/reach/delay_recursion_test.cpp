@@ -113,7 +113,8 @@ TEST(DelayRecursion, GivesTheSetsOfTheFir) {
     const std::vector<double> w = random_bounds(2000, 9);
     for (std::size_t k = 0; k + 5 < w.size(); ++k) {
       const DisturbanceBound bound{{w[k], w[k + 1], w[k + 2], w[k + 3], w[k + 4]}};
-      a.step(bound), b.step(bound);
+      a.step(bound);
+      b.step(bound);
       for (std::size_t d = 0; d < kDirections; ++d) {
         const double slack = 3 * (recursion.delay->tail + recursion.tail) + 1e-9 * b.half_widths()[d];
         ASSERT_NEAR(a.half_widths()[d], b.half_widths()[d], slack) << kp << " " << kd << " " << k;

@@ -140,7 +140,8 @@ TEST(EllipsoidRecursion, ContainsRolloutsOfTheWholeErrorState) {
       e.normalize();
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto n = static_cast<Eigen::Index>(axis);
-        p[axis][i] = 0.02 * e[n], v[axis][i] = 0.05 * e[n + 3];
+        p[axis][i] = 0.02 * e[n];
+        v[axis][i] = 0.05 * e[n + 3];
         w[axis][i] = uniform(random) < 0.5 ? -1 : 1;
       }
     }

@@ -132,7 +132,8 @@ TEST(AxisResponse, TailCoversWhatComesAfterTheTableAndVelocityIsTheIntegralOfIts
         velocity = std::max(velocity, std::abs(initial.p()[1]));
       }
       speed += std::abs(step.v()[0] - last_v);  // |∫ ġ|
-      last = step.p()[0], last_v = step.v()[0];
+      last = step.p()[0];
+      last_v = step.v()[0];
     }
     EXPECT_NEAR(speed / r.velocity_inf, 1, 1e-5);
     EXPECT_LE(after, r.tail * (1 + 1e-6) + 1e-11);

@@ -25,10 +25,12 @@ TEST(HeldCommands, ChargeALoopWithoutDelayByNoMoreThanIsSaid) {
         const double off = axis.kp * (p_cmd - p) + axis.kd * (v_cmd - v);
         const double a = a_cmd + off + held;
         held += kStep * axis.velocity_integrator / axis.kd * off;
-        p += kStep * (v + kStep / 2 * a), v += kStep * a;
+        p += kStep * (v + kStep / 2 * a);
+        v += kStep * a;
         largest = std::max(largest, std::abs(held));
       }
-      p_cmd += 0.02 * v_cmd + 0.0002 * a_cmd, v_cmd += 0.02 * a_cmd;
+      p_cmd += 0.02 * v_cmd + 0.0002 * a_cmd;
+      v_cmd += 0.02 * a_cmd;
     }
   }
   const double said = integrator_response(axis).manoeuvre;

@@ -82,7 +82,8 @@ TEST(BlockExtents, NoSetOfAVoxelReachesFartherAndFewReachMuchLess) {
         if (!set.bounded) continue;
         const Vec3 own(set.half_widths[kX], set.half_widths[kY], set.half_widths[kZ]), most = extents.at(v);
         ASSERT_TRUE((own.array() <= most.array()).all()) << v.transpose();
-        ++bounded, tight += (most.array() <= 1.5 * own.array()).all();
+        ++bounded;
+        tight += (most.array() <= 1.5 * own.array()).all();
       }
       EXPECT_GT(bounded, 500);
       EXPECT_GT(tight, bounded / 3);
@@ -98,7 +99,10 @@ TEST(HoverMap, SaysOfEveryVoxelOfRandomRoomsWhatTheExactSetSays) {
     const auto w = plan::build_world(random_room(seed), model, with_unequal_gains());
     const Count t = expect_agreement(*w, w->reach, 1, 1e-9);
     const Count p = expect_agreement(*w, Reachability(with_unequal_gains(), Method::paper, Loop::continuous), 1, 1e-4);
-    tight.safe += t.safe, tight.unsafe += t.unsafe, paper.safe += p.safe, paper.unsafe += p.unsafe;
+    tight.safe += t.safe;
+    tight.unsafe += t.unsafe;
+    paper.safe += p.safe;
+    paper.unsafe += p.unsafe;
   }
   for (const Count& count : {tight, paper}) {
     EXPECT_GT(count.safe, 1000);

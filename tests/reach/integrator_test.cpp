@@ -28,7 +28,8 @@ TEST(Integrator, HoldsOffASteadyPushAsItsKernelSays) {
       loop.step(1);
       largest = std::max(largest, -loop.held);
       if (t + kEuler < 0.02 * static_cast<double>(bin + 1) || bin >= response.kernel.size()) continue;
-      cumulated += response.kernel[bin] - 2 * response.opposite[bin], ++bin;
+      cumulated += response.kernel[bin] - 2 * response.opposite[bin];
+      ++bin;
       ASSERT_NEAR(cumulated, -loop.held, 0.02) << t;
     }
     EXPECT_LT(std::hypot(loop.held + 1, loop.p), 2e-3);
@@ -70,9 +71,13 @@ TEST(Integrator, ManoeuvresChargeItByNoMoreThanSaidAndSomeByThat) {
     double p = 0, v = 0, a = 1, left = 0, most = 0;
     const double mean_length = std::exponential_distribution(0.3)(random) + 0.3;
     for (double t = 0; t < 60; t += kEuler, left -= kEuler) {
-      if (left <= 0) a = -a, left = std::exponential_distribution(1 / mean_length)(random);
+      if (left <= 0) {
+        a = -a;
+        left = std::exponential_distribution(1 / mean_length)(random);
+      }
       loop.step(0, p, v, a);
-      p += kEuler * v + kEuler * kEuler / 2 * a, v += kEuler * a;
+      p += kEuler * v + kEuler * kEuler / 2 * a;
+      v += kEuler * a;
       most = std::max(most, std::abs(loop.held));
     }
     largest = std::max(largest, most);
@@ -89,10 +94,15 @@ TEST(Integrator, ErrorsAtTheStartChargeItByAsMuchAsSaid) {
     for (double t = 0; t < kAxis.feedback_delay; t += kEuler) {  // what was measured before the start
       const double p = loop.p, v = loop.v;
       loop.step(0);
-      loop.p = p, loop.v = v, loop.a = loop.held = 0;
+      loop.p = p;
+      loop.v = v;
+      loop.a = loop.held = 0;
     }
     double most = 0;
-    for (double t = 0; t < 20; t += kEuler) loop.step(0), most = std::max(most, std::abs(loop.held));
+    for (double t = 0; t < 20; t += kEuler) {
+      loop.step(0);
+      most = std::max(most, std::abs(loop.held));
+    }
     EXPECT_NEAR(of_position ? response.from_position : response.from_velocity, 1.01 * most, 0.03 * most) << of_position;
   }
 }
@@ -143,14 +153,18 @@ std::vector<double> held_after_a_hit(double gain) {
   Loop1 loop(with_gain(gain));
   loop.step(1 / kEuler);
   std::vector<double> held;
-  for (double t = 0; t < 30; t += kEuler) held.push_back(loop.held), loop.step(0);
+  for (double t = 0; t < 30; t += kEuler) {
+    held.push_back(loop.held);
+    loop.step(0);
+  }
   return held;
 }
 
 Reachability at_rest(double gain) {
   Vehicle vehicle = vehicle_of(gain);
   vehicle.controller.velocity_integrator.vertical = 1;
-  vehicle.limits.a_max = 0, vehicle.initial_error = {0, 0};
+  vehicle.limits.a_max = 0;
+  vehicle.initial_error = {0, 0};
   return Reachability(vehicle);
 }
 
@@ -176,8 +190,10 @@ TEST(Integrator, TheBoundOnGustsIsTheEquations) {
   double before = 0, squared = 0, with = 0, age = 1;
   for (const double held : held_after_a_hit(kGain)) {
     const double c = kEuler * std::abs(held);
-    squared += c * (c + 2 * before), before = (before + c) * std::exp(-kEuler / kTau);
-    with += age * std::max(0.0, kEuler * held), age *= std::exp(-kEuler / kTau);
+    squared += c * (c + 2 * before);
+    before = (before + c) * std::exp(-kEuler / kTau);
+    with += age * std::max(0.0, kEuler * held);
+    age *= std::exp(-kEuler / kTau);
   }
   DisturbanceBound here;
   here.w.fill(kHere);
@@ -198,7 +214,8 @@ TEST(Integrator, GustsLessWhatIsHeldHaveNoMoreThanTheSaidDeviation) {
   vehicle.limits.a_max = 0;
   const NetDisturbance net(Reachability(vehicle), air.bounds);
   DisturbanceBound calm, rough;
-  calm.w.fill(3 * kCalm), rough.w.fill(3 * kRough);
+  calm.w.fill(3 * kCalm);
+  rough.w.fill(3 * kRough);
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   const double keep = std::exp(-kEuler / kTau);
@@ -214,7 +231,8 @@ TEST(Integrator, GustsLessWhatIsHeldHaveNoMoreThanTheSaidDeviation) {
       }
       return std::pow(w + loop.held, 2) / kMotions;
     };
-    in_rough += blow(10, kRough), in_calm += blow(0.5, kCalm);
+    in_rough += blow(10, kRough);
+    in_calm += blow(0.5, kCalm);
   }
   const double error = 3 / std::sqrt(2.0 * kMotions);  // of a deviation, three standard errors
   EXPECT_LE(std::sqrt(in_rough), net(rough).w[kX] / 3 * (1 + error));
@@ -237,7 +255,10 @@ TEST(Integrator, AHoverRestsOnItsSetPointAndItsSetHoldsThePush) {
   // The push may set in: the set grows by what it moves the craft before it is held.
   Loop1 loop(kAxis);
   double farthest = 0;
-  for (double t = 0; t < 20; t += kEuler) loop.step(push.x()), farthest = std::max(farthest, loop.p);
+  for (double t = 0; t < 20; t += kEuler) {
+    loop.step(push.x());
+    farthest = std::max(farthest, loop.p);
+  }
   EXPECT_GE(held.half_widths[kX] - set_of(0.4, still).half_widths[kX], farthest);
   EXPECT_GT(farthest, std::abs(loop.p) + 0.1);
 }
@@ -266,7 +287,8 @@ TEST(Integrator, FlightsStayInTheirTubeWhileThePushComesAndGoes) {
     Switching known{0, 0.3}, unknown{-0.05, 0.05}, gust{-0.3, 0.3};
     // The charge of the start: of hovering in some push.
     for (double t = 0; t < 30; t += kEuler) loop.step(known.next(random, 8) + unknown.next(random, 8), -1);
-    loop.p = -1, loop.v = 0;
+    loop.p = -1;
+    loop.v = 0;
     for (std::size_t k = 0; k < commands.size(); ++k) {
       const Setpoint& c = commands[k];
       for (double t = 0; t < 0.02 - kEuler / 2; t += kEuler)

@@ -23,7 +23,9 @@ LinearSystem read_system(const std::string& path, Eigen::Index states, Eigen::In
   std::getline(file, line);
   while (std::getline(file, line)) {
     std::istringstream fields(line);
-    std::getline(fields, matrix, ','), std::getline(fields, row, ','), std::getline(fields, column, ',');
+    std::getline(fields, matrix, ',');
+    std::getline(fields, row, ',');
+    std::getline(fields, column, ',');
     std::getline(fields, value);
     const Eigen::Index i = std::stol(row), j = std::stol(column);
     if (matrix == "A") system.A(i, j) = std::stod(value);
@@ -38,7 +40,10 @@ struct Extremes {
 };
 Extremes extremes(const std::vector<OutputRange>& ranges) {
   Extremes e;
-  for (const OutputRange& r : ranges) e.low = std::min(e.low, r.low), e.high = std::max(e.high, r.high);
+  for (const OutputRange& r : ranges) {
+    e.low = std::min(e.low, r.low);
+    e.high = std::max(e.high, r.high);
+  }
   return e;
 }
 

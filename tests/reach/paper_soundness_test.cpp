@@ -78,7 +78,8 @@ TEST(PaperEllipsoid, IsLeftInPositionTooUnderSampledAndDelayedFeedback) {
   for (const auto& [kp, kd] : kGainSets) {
     const Ratio r = true_over_ellipsoid(kp, kd, 0.04, true);
     EXPECT_GT(r.any, 1.05) << kp << " " << kd;
-    most = std::max(most, r.any), position = std::max(position, r.position);
+    most = std::max(most, r.any);
+    position = std::max(position, r.position);
   }
   EXPECT_NEAR(true_over_ellipsoid(6, 8, 0.04, true).any, 1.35, 0.01);
   EXPECT_NEAR(most, 1.388, 0.01);

@@ -107,7 +107,8 @@ TEST(RiskOfTouching, IsHeldByFlightsOfTheLoopsOwnEquationsAndNotTenTimesTooLarge
     const double risk = stated(axis, tau_w, motion, grid), share = flown(axis, tau_w, motion, 2000, 100 + trial);
     const double least = 1 - std::exp(-risk);  // of touches that come one by one
     const double ratio = share / least;
-    over = std::max(over, ratio), under = std::min(under, ratio);
+    over = std::max(over, ratio);
+    under = std::min(under, ratio);
     EXPECT_LE(share, least + 4 * std::sqrt(least / 2000)) << trial << ": stated " << risk;
     EXPECT_GE(share, 0.1 * least - 4 * std::sqrt(least / 2000)) << trial << ": stated " << risk;
   }
@@ -137,7 +138,8 @@ TEST(RiskOfTouching, OfOneObstacleIsNotLessBecauseAnotherRecedes) {
     const double along = std::clamp((k - 100) / 10.0, 0.0, 1.0);
     there.x.push_back(kBody + 0.1 + 0.2 * along);
     back.x.push_back(between - there.x.back());
-    there.s.push_back(1.2), back.s.push_back(1.2);
+    there.s.push_back(1.2);
+    back.s.push_back(1.2);
   }
   const auto wall = beside_a_wall();
   EXPECT_NEAR(stated(axis, 0.15, there, beside_a_wall(between)),
@@ -193,8 +195,10 @@ TEST(RiskOfTouching, IsHeldWhereTheVehicleGoesRoundAPole) {
     const Eigen::ArrayXd x = ((radius * std::cos(a) + ex.p()).abs() - 0.05).max(0),
                          y = ((radius * std::sin(a) + ey.p()).abs() - 0.05).max(0);
     touched = touched || ((x.square() + y.square()).sqrt() <= vehicle.body.radius);
-    ex.step(s * xi), ey.step(s * eta);
-    xi = keep * xi + std::sqrt(1 - keep * keep) * draw(), eta = keep * eta + std::sqrt(1 - keep * keep) * draw();
+    ex.step(s * xi);
+    ey.step(s * eta);
+    xi = keep * xi + std::sqrt(1 - keep * keep) * draw();
+    eta = keep * eta + std::sqrt(1 - keep * keep) * draw();
   }
   const double share = static_cast<double>(touched.count()) / kFlights, least = 1 - std::exp(-risk);
   EXPECT_LE(share, least + 3 * std::sqrt(least / kFlights)) << risk;
@@ -221,7 +225,8 @@ TEST(RiskOfTouching, IsNoLessThanEachDirectionsOwnAndInfiniteForWhatIsNoNumber) 
   EXPECT_EQ(risk(tube), std::numeric_limits<double>::infinity());
   motion.x.assign(50, 0.0);  // in the wall's face
   EXPECT_GE(risk(motion.tube()), 0.99);
-  motion.x.resize(1), motion.s.resize(1);  // before anything blows
+  motion.x.resize(1);
+  motion.s.resize(1);  // before anything blows
   EXPECT_EQ(risk(motion.tube()), 1);
 }
 

@@ -230,7 +230,8 @@ TEST(ReachTube, BoundOfEachStepIsTheMaximumOverTheVoxelsThatItsOwnSetMeets) {
       }
       for (std::size_t d = 0; d < kDirections; ++d)
         EXPECT_NEAR(tube[k].w_bar.w[d], rounded_up(maximum[d]), 1e-6) << k << " " << d;
-      least = std::min(least, maximum[kY]), most = std::max(most, maximum[kY]);
+      least = std::min(least, maximum[kY]);
+      most = std::max(most, maximum[kY]);
     }
     EXPECT_GT(most, 1.1 * least);  // the field does vary along the way
     // The same sets as with these bounds given.

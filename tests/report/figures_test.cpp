@@ -20,7 +20,10 @@ TEST(Octagon, HasTheHalfWidthsAsItsSupports) {
     ASSERT_EQ(corners.size(), 8u);
     for (const auto d : {kX, kY, kXyPlus, kXyMinus}) {
       double high = -1e9, low = 1e9;
-      for (const auto& c : corners) high = std::max(high, unit(d).dot(c)), low = std::min(low, unit(d).dot(c));
+      for (const auto& c : corners) {
+        high = std::max(high, unit(d).dot(c));
+        low = std::min(low, unit(d).dot(c));
+      }
       EXPECT_NEAR(high, h[d], 1e-12);
       EXPECT_NEAR(low, -h[d], 1e-12);
     }

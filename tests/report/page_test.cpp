@@ -97,7 +97,8 @@ TEST(Thinned, KeepsEachPeakAndEachRowAsItWas) {
     ASSERT_LT(at, whole.rows.size()) << "a row that was not there, or out of order";
     EXPECT_EQ(whole.rows[at][1], row[1]);
     peaks += row[2] > 0;
-    least = std::min(least, row[1]), greatest = std::max(greatest, row[1]);
+    least = std::min(least, row[1]);
+    greatest = std::max(greatest, row[1]);
   }
   EXPECT_EQ(least, -99);
   EXPECT_EQ(greatest,

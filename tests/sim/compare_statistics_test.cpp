@@ -12,9 +12,16 @@ namespace {
 RouteOutcome flown(double jerk2, std::size_t contacts = 0, std::size_t outside = 0) {
   RouteOutcome o;
   o.status = plan::PlanStatus::ok;
-  o.planned.length_m = 5, o.planned.time_s = 6, o.planned.jerk2 = jerk2;
-  o.flown_m = 5.1, o.flown_jerk2 = 20, o.energy_J = 400, o.samples = 351;
-  o.contacts = contacts, o.outside = outside, o.planning_ms = 10;
+  o.planned.length_m = 5;
+  o.planned.time_s = 6;
+  o.planned.jerk2 = jerk2;
+  o.flown_m = 5.1;
+  o.flown_jerk2 = 20;
+  o.energy_J = 400;
+  o.samples = 351;
+  o.contacts = contacts;
+  o.outside = outside;
+  o.planning_ms = 10;
   o.clearance_m = contacts > 0 ? -0.01 : 0.05;
   return o;
 }
@@ -111,11 +118,14 @@ TEST(Table, ComparesOnThePairsThatAllSolveAndCountsTheRestApart) {
 
 TEST(Measures, ShapeIsUnchangedByPaceAndScaleAnd720OnALineAtLeastJerk) {
   auto o = flown(720 * 4.0 * 4.0 / std::pow(5.0, 5));  // ∫ (60 L/T³ (1 − 6u + 6u²))² dt = 720 L²/T⁵
-  o.planned.length_m = 4, o.planned.time_s = 5;
+  o.planned.length_m = 4;
+  o.planned.time_s = 5;
   EXPECT_NEAR(value(o, kShape), 720, 1e-9);
-  o.planned.time_s *= 2, o.planned.jerk2 /= 32;
+  o.planned.time_s *= 2;
+  o.planned.jerk2 /= 32;
   EXPECT_NEAR(value(o, kShape), 720, 1e-9);
-  o.planned.length_m *= 3, o.planned.jerk2 *= 9;
+  o.planned.length_m *= 3;
+  o.planned.jerk2 *= 9;
   EXPECT_NEAR(value(o, kShape), 720, 1e-9);
 }
 

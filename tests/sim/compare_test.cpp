@@ -176,7 +176,8 @@ TEST(FlyRoute, StaysInsideItsSetsAndIsCaughtOutsideSetsOfATwentyFifthOfTheVarian
   std::size_t outside = 0, samples = 0, mutant_outside = 0;
   for (const auto& pair : pairs_in(honest, 6, 5)) {
     const auto a = measure(fly_route(honest, vehicle, pair), honest, vehicle);
-    outside += a.outside, samples += a.samples;
+    outside += a.outside;
+    samples += a.samples;
     EXPECT_EQ(a.contacts, 0u);
     mutant_outside += measure(fly_route(mutant, vehicle, pair), mutant, vehicle).outside;
   }

@@ -32,8 +32,10 @@ Vehicle vehicle() { return config::load_vehicle("builtin:quad-5in").value(); }
 Model calm(std::vector<ModelEffect> extension) {
   Model m;
   m.base = {1e-9, 1e-9};
-  m.ground.lambda = {0, 0}, m.ground.k1 = {0, 0};
-  m.corner.lambda = {0, 0, 0}, m.wall.k1 = {0, 0, 0};
+  m.ground.lambda = {0, 0};
+  m.ground.k1 = {0, 0};
+  m.corner.lambda = {0, 0, 0};
+  m.wall.k1 = {0, 0, 0};
   m.extension = std::move(extension);
   return m;
 }
@@ -213,7 +215,10 @@ TEST(ExtendedModel, AnUpdatedWorldEqualsOneBuiltAnew) {
   map::OccupancyGrid changed = room();
   map::VoxelBox box;
   for (int i = 10; i < 14; ++i)
-    for (int k = 12; k < 16; ++k) changed.set({i, 22, k}, map::Cell::occupied), box.add({i, 22, k});
+    for (int k = 12; k < 16; ++k) {
+      changed.set({i, 22, k}, map::Cell::occupied);
+      box.add({i, 22, k});
+    }
   const auto anew = plan::build_world(changed, model, vehicle());
   const auto updated = plan::update_world(*before, changed, box, model);
   int moved = 0;

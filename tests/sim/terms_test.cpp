@@ -101,7 +101,8 @@ TEST(AirTermsOfAModel, BurstsRaiseTheKurtosisAndKeepTheVariance) {
     constexpr int kSteps = 3'000'000;
     for (int i = 0; i < kSteps; ++i) {
       const double m2 = std::pow(terms.step({0, {2, 2, 1}, Vec3::Zero()}, 2e-3).gust, 2);
-      square += m2 / kSteps, fourth += m2 * m2 / kSteps;
+      square += m2 / kSteps;
+      fourth += m2 * m2 / kSteps;
     }
     EXPECT_NEAR(square, 1, 0.04) << K;
     EXPECT_NEAR(std::log(fourth / (square * square)), K, 0.06) << K;
@@ -121,7 +122,8 @@ TEST(ModelAir, HasTheModelsVarianceAndCorrelation) {
   constexpr int kSteps = 400'000;
   for (int i = 0; i < kSteps; ++i) {
     const Vec3 w = air.step(p, dt);
-    xx += w.x() * w.x() / kSteps, zz += w.z() * w.z() / kSteps;
+    xx += w.x() * w.x() / kSteps;
+    zz += w.z() * w.z() / kSteps;
     x.push_back(w.x());
     if (x.size() > 10) shared += x[x.size() - 11] * w.x() / kSteps;
   }
@@ -134,7 +136,10 @@ TEST(ModelAir, HasTheModelsVarianceAndCorrelation) {
 Vec3 rests(const Terms& terms, std::optional<double> voltage = {}, double yaw = 0) {
   const auto grid = room();
   Model calm;
-  calm.base = {0, 0}, calm.ground.lambda = {0, 0}, calm.ground.k1 = {0, 0}, calm.corner.lambda = {0, 0, 0};
+  calm.base = {0, 0};
+  calm.ground.lambda = {0, 0};
+  calm.ground.k1 = {0, 0};
+  calm.corner.lambda = {0, 0, 0};
   calm.wall.k1 = {0, 0, 0};
   ModelField field(grid, calm);
   auto vehicle = five_inch();
@@ -179,9 +184,11 @@ TEST(ThrustTermsOfAModel, SetpointsActLater) {
     ClosedLoop loop(grid, vehicle, {Vec3(2, 2, 1.5), Vec3::Zero()}, 1, {.terms = terms});
     ClosedLoop still(grid, vehicle, {Vec3(2, 2, 1.5), Vec3::Zero()}, 1, {.terms = terms});
     Setpoint up, stay;
-    up.p_W = {2, 2, 1.6}, stay.p_W = {2, 2, 1.5};
+    up.p_W = {2, 2, 1.6};
+    stay.p_W = {2, 2, 1.5};
     for (int i = 1; i < 1000; ++i) {
-      loop.step(up), still.step(stay);
+      loop.step(up);
+      still.step(stay);
       if ((loop.estimated().p_W - still.estimated().p_W).norm() > 1e-9) return i;
     }
     return 0;
@@ -195,8 +202,12 @@ TEST(ThrustTermsOfAModel, TheAttitudeLagsLonger) {
     ClosedLoop loop(grid, five_inch(), {Vec3(2, 2, 1.5), Vec3::Zero()}, 1, {.terms = terms});
     ClosedLoop still(grid, five_inch(), {Vec3(2, 2, 1.5), Vec3::Zero()}, 1, {.terms = terms});
     Setpoint aside, stay;
-    aside.p_W = {2.1, 2, 1.5}, stay.p_W = {2, 2, 1.5};
-    for (int i = 0; i < 120; ++i) loop.step(aside), still.step(stay);
+    aside.p_W = {2.1, 2, 1.5};
+    stay.p_W = {2, 2, 1.5};
+    for (int i = 0; i < 120; ++i) {
+      loop.step(aside);
+      still.step(stay);
+    }
     return (loop.estimated().p_W - still.estimated().p_W).norm();
   };
   // Of a first-order lag the way in the beginning goes with its inverse.

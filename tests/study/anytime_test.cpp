@@ -82,7 +82,8 @@ TEST(Anytime, AnEffectOfThreeStandardErrorsAFlightIsFoundWithinFifteen) {
 // Brute force over the set of no effects.
 TEST(Anytime, TheNearestPlaceWithoutAnEffectIsTheNearest) {
   Form form;
-  form.floor = 0.5, form.least = 0.3;
+  form.floor = 0.5;
+  form.least = 0.3;
   SmallMatrix information(2, 2), size(2, 2);
   information << 4, 1.5, 1.5, 2;
   size << 1, 0.2, 0.2, 0.5;
@@ -125,7 +126,8 @@ struct Seen {
 Seen look(const std::string& cause, int flights, bool last_alone = false) {
   const auto folder = std::filesystem::temp_directory_path() / ("anytime-test-" + std::to_string(getpid()));
   study_worlds::Request request;
-  request.seed = 100, request.flights = flights;
+  request.seed = 100;
+  request.flights = flights;
   if (!cause.empty()) request.causes = {cause};
   Anytime anytime;
   study_worlds::observe_each(study_worlds::draw_world(request), folder, [&, n = 0](const Observations& seen) mutable {
@@ -156,7 +158,10 @@ TEST(Anytime, LookingLessOftenChangesNoBet) {
 // Alike flown, in the same room: only the copy has the same gusts.
 TEST(SameGusts, AFlightUnderOtherStampsAndWithALittleNoiseIsFoundAndNoOther) {
   study_worlds::Request request;
-  request.seed = 7, request.flights = 8, request.causes = {"recirculation"}, request.size = 3;
+  request.seed = 7;
+  request.flights = 8;
+  request.causes = {"recirculation"};
+  request.size = 3;
   const auto world = study_worlds::draw_world(request);
   auto flights = study_worlds::fly_all(world);
   for (unsigned replica = 1; replica <= 2; ++replica) flights.push_back(study_worlds::fly_again(world, 2, replica));

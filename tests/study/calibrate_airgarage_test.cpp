@@ -111,7 +111,9 @@ TEST(HeightEffect, OfPlateAndStepsHoldsWhatWasMadeAndSeparatesTheScatterOfFlight
       return e.ci95.low < truth && truth < e.ci95.high ? 1 : 0;
     };
     ASSERT_TRUE(effect.ceiling && effect.bins && independent.ceiling);
-    plate += holds(*effect.ceiling, 1.6), bins += holds(*effect.bins, 2), believed += holds(*independent.ceiling, 1.6);
+    plate += holds(*effect.ceiling, 1.6);
+    bins += holds(*effect.bins, 2);
+    believed += holds(*independent.ceiling, 1.6);
     width += std::log(effect.ceiling->ci95.high / effect.ceiling->ci95.low) / kWorlds;
     believed_width += std::log(independent.ceiling->ci95.high / independent.ceiling->ci95.low) / kWorlds;
     EXPECT_NEAR(effect.within, 0.5, 0.08);
@@ -155,7 +157,10 @@ void print(const char* of, const HeightEffect& e) {
   const auto one = [](const std::optional<CalibratedValue>& r) {
     r ? std::printf(" x%.2f [%.2f, %.2f]", r->value, r->ci95.low, r->ci95.high) : std::printf(" none");
   };
-  std::printf("%-38s", of), one(e.low_over_high), one(e.bins), one(e.ceiling);
+  std::printf("%-38s", of);
+  one(e.low_over_high);
+  one(e.bins);
+  one(e.ceiling);
   std::printf("  %3zu windows %2zu flights %2zu days, low in %zu high in %zu, sd %.2f %.2f\n", e.windows, e.flights,
               e.days, e.low_flights, e.high_flights, e.within, e.between);
 }
@@ -173,7 +178,8 @@ TEST(HeightEffect, OfTheRealRecordingsAgreesWithTheIntervalsThatComeWithThem) {
   std::erase_if(noted, [](auto& r) { return r.plate == Plate::not_said; });
   const auto effects = height_effects(rows, 1);
   std::printf("%-38s %-18s %-18s %-18s\n", "", "law", "within x2, no law", "plate");
-  print("hovers and passes", effects->all), print("hovers", *effects->hovers);
+  print("hovers and passes", effects->all);
+  print("hovers", *effects->hovers);
   print("flights with a note alone", height_effects(noted, 1)->all);
   print("windows of 1 s", height_effects(shorter, 1)->all);
   print("windows of 1 s as if independent", independent(shorter));

@@ -59,7 +59,8 @@ Data sampled(const Corridors& corridors, int flights_per_corridor, std::uint64_t
         const Vec3 ln = Vec3(sigma(m, spot)).array().log() + level;
         for (int w = 0; w < 4; ++w)
           hover.ln_variance.push_back(ln + within * Vec3(normal(random), normal(random), normal(random)));
-        hover.push = hover.push_noise = Vec3::Zero(), hover.tau_w = 0.15;
+        hover.push = hover.push_noise = Vec3::Zero();
+        hover.tau_w = 0.15;
         data.hovers.push_back(hover);
       }
     }

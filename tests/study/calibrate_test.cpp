@@ -31,8 +31,10 @@ std::vector<double> once(const Data& data) { return std::vector<double>(data.pla
 TEST(CalibrateFeatures, ReproduceTheExactFieldForAnyConstants) {
   const auto grid = map::builtin_scene("apartment").value();
   auto model = config::load_model("builtin:quad-5in").value();
-  model.ground.k2 = 2.2, model.wall.k2 = 6.1;  // between the stored decays
-  model.corner.lambda.normal = 0.07, model.wall.k1.vertical = 0.4;
+  model.ground.k2 = 2.2;
+  model.wall.k2 = 6.1;  // between the stored decays
+  model.corner.lambda.normal = 0.07;
+  model.wall.k1.vertical = 0.4;
   const std::vector<Vec3> at = {{3, 4, 1.2}, {0.4, 4.6, 0.6}, {5.5, 2.0, 1.0}, {7.2, 1.8, 0.9}, {9.3, 5.5, 1.3}};
   const auto found = features(grid, model, at);
   const field::ProximityField exact(grid, model);
@@ -48,7 +50,10 @@ TEST(CalibrateFeatures, ReproduceTheExactFieldForAnyConstants) {
 TEST(CalibrateFit, FindsTheConstantsThatMadeTheDataWhenNothingScatters) {
   const auto& corridors = five_inch();
   auto wanted = corridors.gates;
-  wanted.wall.k1 = {0.5, 0.05, 0.2}, wanted.wall.k2 = 4, wanted.ground.k2 = 2, wanted.base = {0.01, 0.004};
+  wanted.wall.k1 = {0.5, 0.05, 0.2};
+  wanted.wall.k2 = 4;
+  wanted.ground.k2 = 2;
+  wanted.base = {0.01, 0.004};
   const auto parameters = parameters_of(wanted);
   const auto data = sampled(
       corridors, 3, 5,
@@ -134,10 +139,14 @@ TEST(CalibrateIntervals, CoverTheConstantsThatMadeTheData) {
       return bound_variance(corridors.places[m].features[i], parameters_of(corridors.gates));
     });
     Options options;
-    options.fit.quantile = kQuantile, options.bootstraps = 60, options.seed = seed, options.folds = 2;
+    options.fit.quantile = kQuantile;
+    options.bootstraps = 60;
+    options.seed = seed;
+    options.folds = 2;
     const auto c = calibrate(data, corridors.gates, {}, false, options);
     for (std::size_t p = 0; p < kParameters; ++p) {
-      inside += c.ci95[p].low <= wanted[p] && wanted[p] <= c.ci95[p].high ? 1 : 0, all += 1;
+      inside += c.ci95[p].low <= wanted[p] && wanted[p] <= c.ci95[p].high ? 1 : 0;
+      all += 1;
     }
   }
   // 0.909 over 25 campaigns (docs/measurements/calibration.md); 16 campaigns scatter by about 0.02.
@@ -172,8 +181,10 @@ double integral_time_of_the_air(const Vehicle& vehicle) {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> w;
     double mean = 0;
-    for (std::size_t k = 0; k < kSamples; ++k)
-      w.push_back(air.step({0, 0, 1}, kStep)[axis]), mean += w.back() / kSamples;
+    for (std::size_t k = 0; k < kSamples; ++k) {
+      w.push_back(air.step({0, 0, 1}, kStep)[axis]);
+      mean += w.back() / kSamples;
+    }
     const auto with = [&](std::size_t lag) {
       double product = 0;
       for (std::size_t k = lag; k < kSamples; ++k) product += (w[k] - mean) * (w[k - lag] - mean);
@@ -252,7 +263,8 @@ TEST(CalibrateModelFile, IsReadBackByTheReaderOfEveryProgram) {
   const auto c = calibrate(data, corridors.gates, refused, false, options);
   const auto path = std::filesystem::temp_directory_path() / ("backwash_model_" + std::to_string(::getpid()) + ".toml");
   Provenance from;
-  from.logs = {"a \"quoted\\name\".csv"}, from.quantile = 0.9;
+  from.logs = {"a \"quoted\\name\".csv"};
+  from.quantile = 0.9;
   std::ofstream(path) << model_text(c, from);
   const auto read = config::load_model(path);
   std::filesystem::remove(path);

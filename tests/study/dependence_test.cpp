@@ -55,7 +55,11 @@ TEST(Dependence, StatisticIsTheSumOverPairsTriplesAndQuadruples) {
   std::normal_distribution draw;
   const Eigen::Index n = 8;
   MatrixXd x(n, 1), y(n, 2);
-  for (Eigen::Index i = 0; i < n; ++i) x(i, 0) = draw(rng), y(i, 0) = x(i, 0) * x(i, 0), y(i, 1) = draw(rng);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    x(i, 0) = draw(rng);
+    y(i, 0) = x(i, 0) * x(i, 0);
+    y(i, 1) = draw(rng);
+  }
   double pairs = 0, triples = 0, quadruples = 0;  // E kl + E k E l − 2 E E k E l
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index j = 0; j < n; ++j) {
@@ -161,7 +165,8 @@ TEST(Dependence, AutocorrelationAloneIsNotDependence) {
                    order.begin() + static_cast<std::ptrdiff_t>((f + 1) * kWindows), rng);
     shuffled += independence(x(order), y(order), first_of(), 199, draw).p <= 0.05 ? 1 : 0;
   }
-  RecordProperty("rejected", rejected), RecordProperty("shuffled", shuffled);
+  RecordProperty("rejected", rejected);
+  RecordProperty("shuffled", shuffled);
   EXPECT_LE(rejected, 18);  // 99 % of runs of a test of size 0.05; 1,500 draws gave 0.065 (docs/model.md section 8)
   EXPECT_GE(shuffled, 60);
 }
@@ -193,16 +198,22 @@ Observations pushed_in_every_other(std::size_t flights, std::size_t from) {
   std::mt19937_64 rng(5);
   std::normal_distribution draw;
   Observations seen;
-  seen.flights = flights, seen.windows.resize(flights * kOfFlight, WindowRow{});
+  seen.flights = flights;
+  seen.windows.resize(flights * kOfFlight, WindowRow{});
   for (auto& y : seen.y) y.assign(seen.windows.size(), 0);
   for (auto& weight : seen.weight) weight.assign(seen.windows.size(), 0);
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     auto& w = seen.windows[i];
-    w.flight = i / kOfFlight, w.sigma.setConstant(0.04), w.R_WB.setZero(), w.p_W = backwash::Vec3(draw(rng), 0, 1);
+    w.flight = i / kOfFlight;
+    w.sigma.setConstant(0.04);
+    w.R_WB.setZero();
+    w.p_W = backwash::Vec3(draw(rng), 0, 1);
     if (i % kOfFlight == 0) seen.first.push_back(i);
-    seen.y[kMeanZ][i] = draw(rng) + (w.flight % 2 == from ? w.p_W.x() : 0), seen.weight[kMeanZ][i] = 1;
+    seen.y[kMeanZ][i] = draw(rng) + (w.flight % 2 == from ? w.p_W.x() : 0);
+    seen.weight[kMeanZ][i] = 1;
   }
-  seen.first.push_back(seen.windows.size()), seen.units.first = seen.first;
+  seen.first.push_back(seen.windows.size());
+  seen.units.first = seen.first;
   seen.missing = {{Source::attitude, "not flown"}, {Source::map, "none"}};
   return seen;
 }

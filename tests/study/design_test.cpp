@@ -241,7 +241,8 @@ TEST(Design, OfRotorsThatMotorsAloneTellIsNone) {
     return *std::ranges::find_if(catalogue(), [&](auto* f) { return f->cause() == cause && f->motors_alone; });
   };
   Accepted& found = result.causes.front().found;
-  found.form = alone("propeller_damage"), found.scale = {0};
+  found.form = alone("propeller_damage");
+  found.scale = {0};
   found.columns = found.form->columns(w.seen.windows, found.scale);
   found.rivals = {{"payload", alone("payload"), {0}, 40}};  // motors alone: however much it is behind
   const auto world = plan::build_world(w.grid, w.model, w.vehicle);

@@ -54,7 +54,8 @@ Observed looked_at() {
   log::FlightLog log;
   for (int k = 0; k < 600; ++k) {
     const double t = 0.02 * k;
-    log.t_s.push_back(t), log.columns["segment"].push_back(0);
+    log.t_s.push_back(t);
+    log.columns["segment"].push_back(0);
     // Swings along each axis: amplitude in m, 1/s.
     for (const auto& [axis, size, w] : {std::tuple('x', 0.05, 1.0), {'y', 0.04, 1.3}, {'z', 0.05, 0.9}}) {
       log.columns[std::string{axis, '_', 'm'}].push_back(1.5 + size * std::sin(w * t));

@@ -27,7 +27,10 @@ Observations flights() {
   seen.windows.resize(kFlights * kOfFlight, WindowRow{});
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     auto& w = seen.windows[i];
-    w.flight = i / kOfFlight, w.sigma.setConstant(0.04), w.R_WB.setZero(), w.give.setZero();
+    w.flight = i / kOfFlight;
+    w.sigma.setConstant(0.04);
+    w.R_WB.setZero();
+    w.give.setZero();
     if (i % kOfFlight == 0) seen.first.push_back(i);
   }
   seen.first.push_back(seen.windows.size());
@@ -39,7 +42,8 @@ Observations flights() {
 }
 
 void measure(Observations& seen, Channel channel, std::size_t i, double value) {
-  seen.y[channel][i] = value, seen.weight[channel][i] = 1;
+  seen.y[channel][i] = value;
+  seen.weight[channel][i] = 1;
 }
 
 /// `parameter`: of the form, where the cause has several.
@@ -74,7 +78,9 @@ TEST(AveragedEstimate, LeavesAFortiethOfTheModelsDrawsBeyondEachEnd) {
   for (int i = 0; i < kDraws; ++i) {
     const Guess& g = guesses[which(rng)];
     const double x = g.value + g.error * normal(rng);
-    below += x<e.low, above += x> e.high, sum += x;
+    below += x < e.low;
+    above += x > e.high;
+    sum += x;
   }
   EXPECT_NEAR(below / double{kDraws}, 0.025, 0.0015);
   EXPECT_NEAR(above / double{kDraws}, 0.025, 0.0015);
@@ -116,7 +122,8 @@ TEST(Refine, FindsAPushWhereTheCraftWasPushedToAndNotWhereItWasTold) {
     for (unsigned seed = 1; seed <= kWorlds; ++seed) {
       auto seen = over_a_floor(size, 4, seed);
       const Estimate e = refined(seen, "ground_thrust", {0.3}).parameters[0];
-      aware += e.value / kWorlds, covered += covers(e, size);
+      aware += e.value / kWorlds;
+      covered += covers(e, size);
       for (auto& w : seen.windows) w.give.setZero();
       unaware += refined(seen, "ground_thrust", {0.3}).parameters[0].value / kWorlds;
     }
@@ -163,7 +170,8 @@ Observations on_sagging_batteries(double s, unsigned seed) {
     auto& w = seen.windows[i];
     w.voltage = i % kOfFlight == 0 ? charged(rng) : seen.windows[i - 1].voltage - 0.04;
     const double flown = std::pow(w.voltage / 16.8, s);
-    w.thrust_acc = backwash::kGravity / flown, w.slope_gain = {0, 2};
+    w.thrust_acc = backwash::kGravity / flown;
+    w.slope_gain = {0, 2};
     measure(seen, kMeanZ, i, backwash::kGravity - w.thrust_acc + noise(rng));
     measure(seen, kThrustSlope, i, (flown - 1) * w.slope_gain[1] + noise(rng));
   }
@@ -187,7 +195,8 @@ TEST(Refine, OfALoadLeavesTheVarianceOfTheAirAlone) {
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     auto& w = seen.windows[i];
     const double a = i % 3 ? 0.0 : 1.5;
-    w.thrust_acc = backwash::kGravity / 0.75, w.asked2.setConstant(a * a / 2);
+    w.thrust_acc = backwash::kGravity / 0.75;
+    w.asked2.setConstant(a * a / 2);
     measure(seen, kMeanZ, i, -0.25 * w.thrust_acc + noise(rng));
     for (const Channel c : kVariances)
       measure(seen, c, i, std::log((w.sigma[0] + std::pow(a / 3, 2) / 2) / w.sigma[0]) + noise(rng));
@@ -211,7 +220,10 @@ double ln_variance_of_gusts(double B, const std::function<double(double)>& v, st
   for (int i = 0; i < kRows; ++i) {
     gust = decay * gust + std::sqrt(1 - decay * decay) * normal(rng);
     const double u = (i + 0.5) / kRows - 0.5, x = std::exp(0.5 * B * v(u + 0.5)) * gust;
-    sum += x, moved += u * x, square += x * x, steps += u * u;
+    sum += x;
+    moved += u * x;
+    square += x * x;
+    steps += u * u;
   }
   return std::log((square - sum * sum / kRows - moved * moved / steps) / kRows);
 }
@@ -226,7 +238,8 @@ TEST(Refine, FindsHowGustsGoWithTheSpeedInWindowsThatStart) {
       auto seen = flights();
       for (std::size_t i = 0; i < seen.windows.size(); ++i) {
         auto& w = seen.windows[i];
-        w.duration = 2, w.shares.fill(1.0 / kPoints);
+        w.duration = 2;
+        w.shares.fill(1.0 / kPoints);
         const double most = pace(rng);
         const auto v = [&](double s) { return i % 4 ? most * s : most; };
         for (std::size_t k = 0; k < kPoints; ++k) w.speeds[k] = v((static_cast<double>(k) + 0.5) / kPoints);
@@ -253,7 +266,8 @@ TEST(Refine, FindsADragThatGrowsWithTheSpeedInWindowsThatStart) {
       for (std::size_t k = 0; k < kPoints; ++k)
         w.speeds[k] = i % 2 ? most * (static_cast<double>(k) + 0.5) / kPoints : most;
       w.v_W = Vec3(i % 2 ? most / 2 : most, 0, 0);
-      measure(seen, kMeanX, i, -push + noise(rng)), measure(seen, kMeanY, i, noise(rng));
+      measure(seen, kMeanX, i, -push + noise(rng));
+      measure(seen, kMeanY, i, noise(rng));
     }
     covered += covers(refined(seen, "rotor_drag", {}).parameters[0], 0.23);
   }

@@ -27,7 +27,8 @@ Observations quiet() {
 
 StudyResult studied(const Observations& seen, std::vector<Known> known, bool dependence = false) {
   StudyOptions options;
-  options.minimum_detectable = false, options.dependence = dependence;
+  options.minimum_detectable = false;
+  options.dependence = dependence;
   options.search.known = std::move(known);
   return study(seen, options);
 }

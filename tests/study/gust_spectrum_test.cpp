@@ -74,7 +74,10 @@ std::pair<double, GustShape> told(Gusts gusts) {
   for (int n = 0; n < 40; ++n) {
     const std::vector<std::vector<double>> axes{gusts.stretch(), gusts.stretch(), gusts.stretch()};
     const GustFits fits = gust_fits(axes, kRate, Band{}.within(kRate), [](std::size_t, double) { return 1.0; });
-    for (std::size_t k = 0; k < kGustShapes; ++k) taus[k].push_back(fits[k].tau_s), sum[k] += fits[k].ln_likelihood;
+    for (std::size_t k = 0; k < kGustShapes; ++k) {
+      taus[k].push_back(fits[k].tau_s);
+      sum[k] += fits[k].ln_likelihood;
+    }
   }
   const auto best = static_cast<std::size_t>(std::max_element(sum.begin(), sum.end()) - sum.begin());
   std::sort(taus[best].begin(), taus[best].end());

@@ -21,7 +21,8 @@ Vehicle true_vehicle() {
   Vehicle v = shipped();
   v.controller.kp = {7, 9};
   v.controller.kd = {4.6, 5.2};
-  v.controller.latency = 0.06, v.controller.attitude_lag = 0.07;
+  v.controller.latency = 0.06;
+  v.controller.attitude_lag = 0.07;
   return v;
 }
 
@@ -43,8 +44,12 @@ log::FlightLog flown(const Vehicle& vehicle, unsigned seed, bool hover) {
   Vec3 gust = Vec3::Zero();
   for (const auto& command : commands) {
     sim::FlightSample s{};
-    s.t = quad.time(), s.truth = s.estimated = quad.state(), s.acceleration = quad.acceleration();
-    s.attitude = quad.attitude(), s.thrust = quad.thrust(), s.command = command;
+    s.t = quad.time();
+    s.truth = s.estimated = quad.state();
+    s.acceleration = quad.acceleration();
+    s.attitude = quad.attitude();
+    s.thrust = quad.thrust();
+    s.command = command;
     samples.push_back(s);
     quad.command(command);
     for (int k = 0; k < 20; ++k) {

@@ -22,7 +22,9 @@ namespace study = backwash::study;
 WorldOutcome told_of(const std::string& hidden, std::vector<std::vector<std::string>> sets,
                      std::vector<std::string> unknown = {}) {
   WorldOutcome o;
-  o.cell = hidden, o.sets = std::move(sets), o.unknown = std::move(unknown);
+  o.cell = hidden;
+  o.sets = std::move(sets);
+  o.unknown = std::move(unknown);
   if (hidden != "none") o.truth = {hidden};
   return o;
 }
@@ -90,7 +92,9 @@ TEST(StudyMatrix, GatesAreMissedByTheCellsThatMissThem) {
 
 TEST(StudyMatrix, ReadsTheOutcomesThatItWrote) {
   auto o = told_of("trim", {{"trim", "draft"}}, {"z_m"});
-  o.seed = 12345678901234, o.error = 0.25, o.compared = {{"body_x_mps2", 0.1, 0.05, 0.15, 0.12, 0.11}};
+  o.seed = 12345678901234;
+  o.error = 0.25;
+  o.compared = {{"body_x_mps2", 0.1, 0.05, 0.15, 0.12, 0.11}};
   const WorldOutcome read = from_json(to_json(o));
   EXPECT_EQ(to_json(read), to_json(o));
   EXPECT_FALSE(read.gain_share.has_value());
@@ -123,10 +127,17 @@ double height_answers_gusts(const study::Observations& seen) {
       if (const auto& w = seen.windows[i]; w.segment && seen.weight[study::kMeanZ][i] > 0)
         use(dwells[{w.flight, *w.segment}], w.p_W.z(), seen.y[study::kMeanZ][i]);
   };
-  each([](auto& d, double h, double y) { d[0] += 1, d[1] += h, d[2] += y; });
+  each([](auto& d, double h, double y) {
+    d[0] += 1;
+    d[1] += h;
+    d[2] += y;
+  });
   each([&](auto& d, double h, double y) {
-    h -= d[1] / d[0], y -= d[2] / d[0];
-    hy += h * y, hh += h * h, yy += y * y;
+    h -= d[1] / d[0];
+    y -= d[2] / d[0];
+    hy += h * y;
+    hh += h * h;
+    yy += y * y;
   });
   return hh > 0 ? hy * hy / (hh * yy) : 0;
 }

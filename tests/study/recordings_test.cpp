@@ -24,9 +24,15 @@ log::FlightLog flown(double speed, double z) {
     const double t = 0.02 * k;
     log.t_s.push_back(t);
     const auto add = [&](const char* name, double value) { log.columns[name].push_back(value); };
-    add("x_m", speed * t + tremble(rng)), add("y_m", tremble(rng)), add("z_m", z + 0.1 * tremble(rng));
-    add("vx_mps", speed), add("vy_mps", 0), add("vz_mps", 0);
-    add("ax_mps2", 100 * tremble(rng)), add("ay_mps2", 100 * tremble(rng)), add("az_mps2", 100 * tremble(rng));
+    add("x_m", speed * t + tremble(rng));
+    add("y_m", tremble(rng));
+    add("z_m", z + 0.1 * tremble(rng));
+    add("vx_mps", speed);
+    add("vy_mps", 0);
+    add("vz_mps", 0);
+    add("ax_mps2", 100 * tremble(rng));
+    add("ay_mps2", 100 * tremble(rng));
+    add("az_mps2", 100 * tremble(rng));
   }
   return log;
 }
@@ -44,13 +50,15 @@ void add_column(log::FlightLog& log, const std::string& name, double value) {
 TEST(StudyGates, LeaveOutRotorsAtRestAndFeetThatMayTouch) {
   auto idle = flown(0, 0.5), turning = idle;
   for (const char* motor : {"motor1", "motor2", "motor3", "motor4"}) {
-    add_column(turning, motor, 0.6), add_column(idle, motor, 0.6);
+    add_column(turning, motor, 0.6);
+    add_column(idle, motor, 0.6);
     for (std::size_t i = 0; i < 200; ++i) idle.columns[motor][i] = 0;
   }
   EXPECT_EQ(observed(turning).gated_out.size(), 0u);
   EXPECT_EQ(observed(idle).gated_out[Gate::perched], 2u);
   auto low = flown(0, 0.503), clear = flown(0, 0.508);
-  add_column(low, "stood_z_m", 0.5), add_column(clear, "stood_z_m", 0.5);
+  add_column(low, "stood_z_m", 0.5);
+  add_column(clear, "stood_z_m", 0.5);
   EXPECT_EQ(observed(low).gated_out[Gate::perched], 4u);
   EXPECT_EQ(observed(clear).windows.size(), 4u);
 }
@@ -129,15 +137,19 @@ Days days(std::mt19937& rng) {
       const double level = of_day + 0.4 * normal(rng), x = normal(rng);
       for (int w = 0; w < 5; ++w) {
         WindowRow row{};
-        row.flight = static_cast<std::size_t>(4 * day + flight), row.sigma = Vec3::Ones();
-        row.p_W = row.v_W = row.measured_variance = Vec3::Zero(), row.R_WB = Mat3::Zero();
+        row.flight = static_cast<std::size_t>(4 * day + flight);
+        row.sigma = Vec3::Ones();
+        row.p_W = row.v_W = row.measured_variance = Vec3::Zero();
+        row.R_WB = Mat3::Zero();
         made.seen.windows.push_back(row);
         const double y = level + 0.5 * normal(rng);
         for (std::size_t c = 0; c < kChannels; ++c) {
           const bool variance = c == kVarX || c == kVarY || c == kVarZ;
-          made.seen.y[c].push_back(variance ? y : 0), made.seen.weight[c].push_back(variance ? 1 : 0);
+          made.seen.y[c].push_back(variance ? y : 0);
+          made.seen.weight[c].push_back(variance ? 1 : 0);
         }
-        made.day.push_back(day), made.x.push_back(x + 0.3 * normal(rng));
+        made.day.push_back(day);
+        made.x.push_back(x + 0.3 * normal(rng));
       }
     }
     made.seen.units.first.push_back(made.seen.windows.size());
@@ -155,7 +167,9 @@ TEST(DaysOfFlights, HaveAScatterOfTheirOwnBesideThatOfFlightsAndWindows) {
     const auto made = days(rng);
     const Evidence evidence(made.seen);
     const Scatter scatter = evidence.scatter(kVarX);
-    within += scatter.within / 3 / kDraws, between += scatter.between / 3 / kDraws, units += scatter.units / 3 / kDraws;
+    within += scatter.within / 3 / kDraws;
+    between += scatter.between / 3 / kDraws;
+    units += scatter.units / 3 / kDraws;
   }
   EXPECT_NEAR(within, 0.25, 0.01);
   EXPECT_NEAR(between, 0.16, 0.02);
@@ -175,7 +189,8 @@ TEST(DaysOfFlights, NormalEquationsAreThoseOfTheWholeCovariance) {
   Eigen::VectorXd x(n), y(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto a = static_cast<std::size_t>(i);
-    x[i] = std::sqrt(3.0) * made.x[a], y[i] = std::sqrt(3.0) * made.seen.y[kVarX][a];
+    x[i] = std::sqrt(3.0) * made.x[a];
+    y[i] = std::sqrt(3.0) * made.seen.y[kVarX][a];
     for (Eigen::Index j = 0; j < n; ++j) {
       const auto b = static_cast<std::size_t>(j);
       if (made.seen.windows[a].flight == made.seen.windows[b].flight) V(i, j) += scatter.between;

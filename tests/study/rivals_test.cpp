@@ -55,8 +55,14 @@ double correlation(const std::vector<DesignColumn>& a, const std::vector<DesignC
   };
   const auto x = of(a), y = of(b);
   double n = 0, sx = 0, sy = 0, xx = 0, yy = 0, xy = 0;
-  for (std::size_t i = 0; i < x.size(); ++i)
-    n += 1, sx += x[i], sy += y[i], xx += x[i] * x[i], yy += y[i] * y[i], xy += x[i] * y[i];
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    n += 1;
+    sx += x[i];
+    sy += y[i];
+    xx += x[i] * x[i];
+    yy += y[i] * y[i];
+    xy += x[i] * y[i];
+  }
   return (xy - sx * sy / n) / std::sqrt((xx - sx * sx / n) * (yy - sy * sy / n));
 }
 
@@ -229,7 +235,9 @@ TEST(Plausible, ASizeAtAReferenceThatWasNotFlownIsToldAsExtrapolated) {
   auto seen = quiet();
   const Form& form = form_of("ground_thrust");
   Accepted cause;
-  cause.form = &form, cause.scale.value = 0.3, cause.columns = form.columns(seen.windows, cause.scale);
+  cause.form = &form;
+  cause.scale.value = 0.3;
+  cause.columns = form.columns(seen.windows, cause.scale);
   cause.theta = SmallVector::Constant(1, 0.12);
   EXPECT_EQ(extrapolated(cause, seen), "");
   for (auto& w : seen.windows) w.around.height += 1;
@@ -246,14 +254,18 @@ TEST(Words, OddsAreThoseOfTheNats) {
 
 Vehicle vehicle() {
   Vehicle v;
-  v.body.mass = 1, v.propulsion.max_thrust = 20, v.propulsion.thr_mdl_fac = 0.3;
-  v.controller.latency = 0.02, v.controller.attitude_lag = 0.05;
+  v.body.mass = 1;
+  v.propulsion.max_thrust = 20;
+  v.propulsion.thr_mdl_fac = 0.3;
+  v.controller.latency = 0.02;
+  v.controller.attitude_lag = 0.05;
   return v;
 }
 
 Remedy remedy_for(const std::string& cause, double theta, double scale = 0, std::size_t form = 0) {
   NamedCause named;
-  named.found.form = &form_of(cause).effect->forms[form], named.found.scale.value = scale;
+  named.found.form = &form_of(cause).effect->forms[form];
+  named.found.scale.value = scale;
   named.found.theta = SmallVector::Constant(1, theta);
   return remedy_of(named, vehicle());
 }
@@ -272,7 +284,8 @@ TEST(Words, AThrustCurveWithTheTwoKeysHoversAtTheSameCommandAndIsSteeperThere) {
   const auto set = remedy_for("thrust_slope", 0.12).set;
   ASSERT_EQ(set.size(), 2u);
   Vehicle before = vehicle(), after = before;
-  after.propulsion.thr_mdl_fac = set[0].to, after.propulsion.max_thrust = set[1].to;
+  after.propulsion.thr_mdl_fac = set[0].to;
+  after.propulsion.max_thrust = set[1].to;
   const auto thrust = [](const Vehicle& v, double u) { return v.propulsion.max_thrust * thrust_share(v, u); };
   double hover = 0.5;
   for (int i = 0; i < 50; ++i) hover *= std::sqrt(before.body.mass * kGravity / thrust(before, hover));

@@ -50,14 +50,18 @@ TEST(RotorsAgainstReference, NameADamagedPropellerButNoWeightAndNoSoundVehicle) 
     std::array<double, 4> damage{};
     damage[rotor] = std::log(1.25);  // a propeller that gives a fifth less
     const auto found = judge_rotors(reference, flights(3, damage, rng));
-    ++damaged[found->kind], right_rotor += found->rotor == rotor + 1;
+    ++damaged[found->kind];
+    right_rotor += found->rotor == rotor + 1;
     const double m = 0.12;  // a weight beside an arm: its side needs more, the far side less
     std::array<double, 4> weight{};
-    weight[rotor] = m, weight[(rotor + 2) % 4] = -m;
+    weight[rotor] = m;
+    weight[(rotor + 2) % 4] = -m;
     const auto beside = judge_rotors(reference, flights(3, weight, rng));
-    ++weighted[beside->kind], named_weight += holds(*beside, RotorState::payload);
+    ++weighted[beside->kind];
+    named_weight += holds(*beside, RotorState::payload);
     const auto same = judge_rotors(reference, flights(3, {}, rng));
-    ++sound[same->kind], sound_in_set += holds(*same, RotorState::sound);
+    ++sound[same->kind];
+    sound_in_set += holds(*same, RotorState::sound);
     ++quiet[judge_rotors(flights(8, {}, rng, 0.003), flights(3, {}, rng, 0.003))->kind];
   }
   EXPECT_GE(damaged[Kind::propeller_damage], 0.9 * kTrials);
@@ -82,7 +86,8 @@ TEST(RotorsAgainstReference, NameTheSmallestDamageThatTheyPromiseAboutFourTimesI
     for (int k = 0; k < kTrials; ++k) {
       // One further flight: the flights of a group share what scatters between sessions.
       std::array<double, 4> damage{}, half{};
-      damage[2] = std::log1p(promised), half[2] = std::log1p(promised / 2);
+      damage[2] = std::log1p(promised);
+      half[2] = std::log1p(promised / 2);
       const auto reference = flights(count, {}, rng);
       const auto v = judge_rotors(reference, flights(1, damage, rng));
       named += v->kind == Kind::propeller_damage && v->rotor == 3;
@@ -113,7 +118,8 @@ TEST(RotorsAgainstReference, CallASoundVehicleDamagedMoreOftenWhereTheReferenceI
     for (const int count : {3, 2, 2})
       for (const auto& f : session(count)) reference.push_back(f);
     const auto v = judge_rotors(reference, session(3));
-    damaged += v->kind == Kind::propeller_damage, other += !holds(*v, RotorState::sound);
+    damaged += v->kind == Kind::propeller_damage;
+    other += !holds(*v, RotorState::sound);
   }
   std::printf("seven flights of three sessions: called damaged %.3f, not as sound %.3f\n", damaged / double{kTrials},
               other / double{kTrials});
@@ -202,8 +208,14 @@ struct FittedLine {
 FittedLine fitted(const std::vector<std::pair<double, double>>& points) {
   const double n = static_cast<double>(points.size());
   double x = 0, y = 0, xx = 0, xy = 0;
-  for (const auto& [a, b] : points) x += a / n, y += b / n;
-  for (const auto& [a, b] : points) xx += (a - x) * (a - x), xy += (a - x) * (b - y);
+  for (const auto& [a, b] : points) {
+    x += a / n;
+    y += b / n;
+  }
+  for (const auto& [a, b] : points) {
+    xx += (a - x) * (a - x);
+    xy += (a - x) * (b - y);
+  }
   return {y - xy / xx * x, xy / xx};
 }
 
@@ -223,14 +235,22 @@ TEST(CrazyPad, ShareOfMotorThreeIsPredictedByTheCutLengthHeldOutByCondition) {
     double mean = 0;
     for (const auto& [name, other] : cut_mm)
       for (const double s : share.at(name))
-        if (name != held_out) by_cut.emplace_back(other, s), by_share.emplace_back(s, other), mean += s;
+        if (name != held_out) {
+          by_cut.emplace_back(other, s);
+          by_share.emplace_back(s, other);
+          mean += s;
+        }
     mean /= static_cast<double>(by_cut.size());
     const FittedLine of_share = fitted(by_cut), of_length = fitted(by_share);
     double predicted = 0, own = 0;
     for (const double s : share.at(held_out)) {
-      without += std::pow(s - mean, 2), with += std::pow(s - of_share.offset - of_share.slope * mm, 2), count += 1;
+      without += std::pow(s - mean, 2);
+      with += std::pow(s - of_share.offset - of_share.slope * mm, 2);
+      count += 1;
       const double told = of_length.offset + of_length.slope * s;
-      length += std::pow(told - mm, 2), predicted += told, own += 1;
+      length += std::pow(told - mm, 2);
+      predicted += told;
+      own += 1;
     }
     std::printf("%-26s cut %.0f mm, predicted by the others %.1f mm\n", held_out.c_str(), mm, predicted / own);
   }

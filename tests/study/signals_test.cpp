@@ -57,9 +57,11 @@ std::optional<RotorLine> made_line(double hz, double amplitude, int held, std::m
     gust = phi * gust + std::sqrt(1 - phi * phi) * draw(rng);
     wander = 0.9 * wander + 0.2 * draw(rng);
     if (i % held == 0) rate = (hz + wander) * (1 + 0.004 * draw(rng));
-    truth += 2 * M_PI * (hz + wander) * dt, told += 2 * M_PI * rate * dt;
+    truth += 2 * M_PI * (hz + wander) * dt;
+    told += 2 * M_PI * rate * dt;
     x.push_back(std::sqrt(kGusts) * gust + 0.05 * draw(rng) + amplitude * std::sin(truth));
-    t.push_back(i * dt), phase.push_back(told);
+    t.push_back(i * dt);
+    phase.push_back(told);
   }
   return rotor_line(detrended(x), t, phase);
 }
@@ -112,7 +114,9 @@ TEST(RotorValues, OneLineOfSeveralRotorsCountsOnce) {
     Series s;
     std::vector<double> residual;
     for (std::size_t i = 0; i < 100; ++i) {
-      s.t.push_back(static_cast<double>(i) / kRate), s.row.push_back(i), residual.push_back(draw(rng));
+      s.t.push_back(static_cast<double>(i) / kRate);
+      s.row.push_back(i);
+      residual.push_back(draw(rng));
       for (std::size_t r = 0; r < 4; ++r)
         log.columns["rpm" + std::to_string(r + 1)].push_back(60 * (190 + apart * static_cast<double>(r)));
     }
@@ -176,7 +180,8 @@ TEST(Spread, SaysTheVarianceThatWasMadeHoweverShortTheStretch) {
 TEST(SlowCourse, KeepsADischargeAndDropsWhatAlternates) {
   std::vector<double> t, discharge, logged;
   for (int i = 0; i < 40; ++i) {
-    t.push_back(2 * i), discharge.push_back(16.4 - 0.012 * t.back() + 2e-5 * t.back() * t.back());
+    t.push_back(2 * i);
+    discharge.push_back(16.4 - 0.012 * t.back() + 2e-5 * t.back() * t.back());
     logged.push_back(discharge.back() + (i % 2 ? 0.05 : -0.05));
   }
   const auto course = slow_course(t, logged);

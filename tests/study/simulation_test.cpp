@@ -53,7 +53,10 @@ const NamedCause* named(const StudyResult& result, const std::string& cause) {
 double mean_square(const Observations& seen, Channel c) {
   double sum = 0, n = 0;
   for (std::size_t i = 0; i < seen.windows.size(); ++i)
-    if (seen.weight[c][i] > 0) sum += seen.y[c][i] * seen.y[c][i], n += 1;
+    if (seen.weight[c][i] > 0) {
+      sum += seen.y[c][i] * seen.y[c][i];
+      n += 1;
+    }
   return sum / n;
 }
 
@@ -152,12 +155,22 @@ TEST(Residuals, AreOfTheSameWindowsAndLeaveOutWhatWasNotSimulated) {
   measured.flights = replica.flights = 2;
   const auto add = [](Observations& seen, std::size_t flight, double t, double y) {
     WindowRow row{};
-    row.flight = flight, row.t = t;
+    row.flight = flight;
+    row.t = t;
     seen.windows.push_back(row);
-    for (std::size_t c = 0; c < kChannels; ++c) seen.y[c].push_back(y), seen.weight[c].push_back(1);
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      seen.y[c].push_back(y);
+      seen.weight[c].push_back(1);
+    }
   };
-  add(measured, 0, 1, 5), add(measured, 0, 3, 6), add(measured, 1, 1, 7), add(measured, 1, 9, 8);
-  add(replica, 0, 1.1, 4), add(replica, 0, 2.95, 2), add(replica, 1, 1, 4), add(replica, 1, 8.7, 0);
+  add(measured, 0, 1, 5);
+  add(measured, 0, 3, 6);
+  add(measured, 1, 1, 7);
+  add(measured, 1, 9, 8);
+  add(replica, 0, 1.1, 4);
+  add(replica, 0, 2.95, 2);
+  add(replica, 1, 1, 4);
+  add(replica, 1, 8.7, 0);
   Observations other = replica;
   for (double& y : other.y[kMeanX]) y += 2;
   const Told told = told_of(measured, std::vector{replica, other});

@@ -12,7 +12,10 @@ namespace {
 /// ln of four thrusts over their mean logarithm, rotors 1–3 and 2–4 facing each other.
 std::array<double, 4> shares(std::array<double, 4> thrust) {
   double mean = 0;
-  for (double& t : thrust) t = std::log(t), mean += t / 4;
+  for (double& t : thrust) {
+    t = std::log(t);
+    mean += t / 4;
+  }
   for (double& t : thrust) t -= mean;
   return thrust;
 }

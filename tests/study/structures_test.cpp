@@ -166,7 +166,8 @@ TEST(StudyWorlds, UnknownsAreAFamilyAndNotAFewShapes) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     const auto s = study_worlds::draw_world({seed, {"unknown"}, 1, 12, ""}).effects.structure;
     drawn.insert(study_worlds::text_of(s));
-    kinds.insert(static_cast<int>(s.kind)), wheres.insert(static_cast<int>(s.where));
+    kinds.insert(static_cast<int>(s.kind));
+    wheres.insert(static_cast<int>(s.where));
   }
   EXPECT_GT(drawn.size(), 45u);
   EXPECT_EQ(kinds.size(), 5u);

@@ -89,9 +89,11 @@ TEST(TwoLevels, NeighboursThatAreAlikeInflateTheErrorOfAMean) {
   AmplitudeCourse white, red;
   double x = 0;
   for (int i = 0; i < 4000; ++i) {
-    white.value.push_back(noise(rng)), white.weight.push_back(1);
+    white.value.push_back(noise(rng));
+    white.weight.push_back(1);
     x = 0.5 * x + noise(rng);
-    red.value.push_back(x), red.weight.push_back(1);
+    red.value.push_back(x);
+    red.weight.push_back(1);
   }
   EXPECT_NEAR(inflation(white, 4), 1, 0.15);
   EXPECT_NEAR(inflation(red, 4), 1 + 2 * (0.5 + 0.25 + 0.125 + 0.0625), 0.3);
@@ -106,7 +108,10 @@ TEST(TwoLevels, StudentsTailIsThatOfTheDensity) {
 /// p of a division by its definition.
 double p_of(const std::vector<double>& values, const std::vector<bool>& high, double tried, double lost) {
   double count[2] = {}, mean[2] = {}, square = 0;
-  for (std::size_t f = 0; f < values.size(); ++f) count[high[f]] += 1, mean[high[f]] += values[f];
+  for (std::size_t f = 0; f < values.size(); ++f) {
+    count[high[f]] += 1;
+    mean[high[f]] += values[f];
+  }
   if (count[0] == 0 || count[1] == 0) return 1;
   for (const int k : {0, 1}) mean[k] /= count[k];
   for (std::size_t f = 0; f < values.size(); ++f) square += std::pow(values[f] - mean[high[f]], 2);

@@ -43,9 +43,12 @@ log::FlightLog shaken(const Vehicle& vehicle, const Tones& push, double seconds,
   State estimated = vio.estimate(start, 0);
   for (int k = 0; k * kControlPeriod < seconds; ++k) {
     log.t_s.push_back(k * kControlPeriod);
-    add(log, "", "_m", estimated.p_W), add(log, "v", "_mps", estimated.v_W);
+    add(log, "", "_m", estimated.p_W);
+    add(log, "v", "_mps", estimated.v_W);
     add(log, "a", "_mps2", quad.acceleration());
-    add(log, "cmd_", "_m", hold.p_W), add(log, "cmd_v", "_mps", hold.v_W), add(log, "cmd_a", "_mps2", hold.a_W);
+    add(log, "cmd_", "_m", hold.p_W);
+    add(log, "cmd_v", "_mps", hold.v_W);
+    add(log, "cmd_a", "_mps2", hold.a_W);
     log.columns["thrust"].push_back(quad.thrust());
     log.columns["segment"].push_back(0);
     quad.command(hold);
@@ -123,7 +126,9 @@ TEST(Windows, DividesOutTheAttenuationOfTheLoopWithoutSetPoints) {
   EXPECT_NEAR(loop_attenuation({6, 4, 0, 0}, 0.5, {}), 0.39, 0.005);
   // A push of that correlation time, through the simulated vehicle, logged without set-points.
   auto vehicle = five_inch();
-  vehicle.controller.kp = {6, 6}, vehicle.controller.kd = {4, 4}, vehicle.controller.attitude_lag = 0;
+  vehicle.controller.kp = {6, 6};
+  vehicle.controller.kd = {4, 4};
+  vehicle.controller.attitude_lag = 0;
   const auto w = autoregressive(std::exp(-0.001 / 0.2), 400000, 9);
   std::vector<double> logged;
   sim::Quadrotor quad(vehicle, {Vec3(0, 0, 1), Vec3::Zero()});
@@ -133,7 +138,8 @@ TEST(Windows, DividesOutTheAttenuationOfTheLoopWithoutSetPoints) {
     if (k % 20 != 0) continue;
     log.t_s.push_back(0.001 * static_cast<double>(k));
     logged.push_back(0.5 * w[k]);
-    add(log, "", "_m", quad.state().p_W), add(log, "v", "_mps", quad.state().v_W);
+    add(log, "", "_m", quad.state().p_W);
+    add(log, "v", "_mps", quad.state().v_W);
     add(log, "a", "_mps2", quad.acceleration());
     log.columns["segment"].push_back(0);
   }
@@ -182,7 +188,8 @@ TEST_F(Gates, CountFrozenPerchedAndSaturatedWindowsOnceEach) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> noise(0, 5e-5);
   change(8, [&](std::size_t k) {  // stands on the ground: tracker noise is all that moves
-    log_.columns["x_m"][k] = 1 + noise(random), log_.columns["y_m"][k] = 2 + noise(random);
+    log_.columns["x_m"][k] = 1 + noise(random);
+    log_.columns["y_m"][k] = 2 + noise(random);
     log_.columns["z_m"][k] = 0.03 + noise(random);
   });
   change(11, [&](std::size_t k) { log_.columns["thrust"][k] = 0.1; });  // moved about by hand, rotors idle
@@ -199,7 +206,8 @@ TEST_F(Gates, CountFrozenPerchedAndSaturatedWindowsOnceEach) {
 TEST_F(Gates, KeepWhatIsWrongOutOfTheWindowsBesideIt) {
   const auto clean = cut();
   change(9, [&](std::size_t k) {
-    log_.columns["ax_mps2"][k] = 40, log_.columns["thrust"][k] = 1.0;  // a crash, say
+    log_.columns["ax_mps2"][k] = 40;
+    log_.columns["thrust"][k] = 1.0;  // a crash, say
   });
   const auto flight = cut();
   ASSERT_EQ(flight.windows.size(), 19u);

@@ -36,7 +36,9 @@ struct Watched {
 
 Watched watch(const Options& options, std::uint64_t seed, const std::filesystem::path& folder) {
   Request request;
-  request.seed = seed, request.flights = options.flights, request.size = options.size;
+  request.seed = seed;
+  request.flights = options.flights;
+  request.size = options.size;
   if (!options.cause.empty()) request.causes = {options.cause};
   const HiddenWorld world = draw_world(request);
   auto chosen = with_reference(world, folder);

@@ -56,7 +56,10 @@ double median(std::vector<int> x) {
 /// Medians of the flights needed; those that never separate count as one more than were flown.
 void report(const std::vector<Trial>& all) {
   std::map<std::string, std::vector<const Trial*>> by_cell;
-  for (const Trial& t : all) by_cell[t.cell].push_back(&t), by_cell["all"].push_back(&t);
+  for (const Trial& t : all) {
+    by_cell[t.cell].push_back(&t);
+    by_cell["all"].push_back(&t);
+  }
   std::printf(
       "| cell | worlds | could not distinguish | expected | designed | same kind | free kind | of the list | within "
       "expected |\n");
@@ -69,7 +72,11 @@ void report(const std::vector<Trial>& all) {
       applies += t->applies;
       if (t->needed.empty()) continue;
       for (std::size_t k = 0; k < needed.size(); ++k) needed[k].push_back(t->needed[k]);
-      if (t->expected > 0) expected.push_back(t->expected), ++told, held += t->needed[0] <= t->expected;
+      if (t->expected > 0) {
+        expected.push_back(t->expected);
+        ++told;
+        held += t->needed[0] <= t->expected;
+      }
     }
     std::printf("| %s | %zu | %d | %.1f (%d) |", name.c_str(), trials.size(), applies, median(expected), told);
     for (const auto& x : needed) std::printf(" %.1f |", median(x));

@@ -75,7 +75,8 @@ struct Arms {
 Trial trial(const MatrixCell& cell, std::uint64_t seed, const TrialOptions& options,
             const std::filesystem::path& folder) {
   Trial out;
-  out.cell = cell.name, out.seed = seed;
+  out.cell = cell.name;
+  out.seed = seed;
   const HiddenWorld world = draw_world({seed, cell.causes, options.size, options.flights, cell.confound});
   const auto first = fly_all(world);
   const auto seen = observe(world, first, folder);
@@ -92,11 +93,14 @@ Trial trial(const MatrixCell& cell, std::uint64_t seed, const TrialOptions& opti
       backwash::plan::build_world(backwash::map::load_map((folder / "map.bt").string()).value(), model, vehicle);
   const Vec3 start(0.5 * world.room.inside.high.x(), 0.5 * world.room.inside.high.y(), 1.2);
   const auto design = study::design(seen, result, *room, model, start, options.seconds);
-  out.fitting = design.flights.size(), out.left_out = design.left_out.size(), out.message = design.message;
+  out.fitting = design.flights.size();
+  out.left_out = design.left_out.size();
+  out.message = design.message;
   if (design.flights.empty()) return out;
   const auto& best = design.flights.front();
   out.way = best.name + (best.used_battery ? ", used battery" : "");
-  out.expected = best.flights.value_or(0), out.separated = best.separated;
+  out.expected = best.flights.value_or(0);
+  out.separated = best.separated;
   Arms arms{world, design, options.seconds, used_charge(world, first.front()), Rng(seed ^ 0x5eed)};
   const int before = options.flights + 1000;  // numbers, hence gusts, that no first flight has
   for (const Further kind : {Further::designed, Further::same_kind, Further::free_kind, Further::of_list})
@@ -114,9 +118,17 @@ nlohmann::json to_json(const Trial& t) {
 
 Trial trial_from_json(const nlohmann::json& j) {
   Trial t;
-  t.cell = j["cell"], t.seed = j["seed"], t.told = j["told"], t.way = j["way"], t.message = j["message"];
-  t.applies = j["applies"], t.expected = j["expected"], t.separated = j["separated"];
-  t.fitting = j["fitting"], t.left_out = j["left_out"], t.needed = j["needed"].get<std::vector<int>>();
+  t.cell = j["cell"];
+  t.seed = j["seed"];
+  t.told = j["told"];
+  t.way = j["way"];
+  t.message = j["message"];
+  t.applies = j["applies"];
+  t.expected = j["expected"];
+  t.separated = j["separated"];
+  t.fitting = j["fitting"];
+  t.left_out = j["left_out"];
+  t.needed = j["needed"].get<std::vector<int>>();
   return t;
 }
 

@@ -34,8 +34,12 @@ Craft draw_craft(Rng& rng) {
   Craft c = large ? Craft{1.9, 38, 0.3, 0.089, 0.22, 0.25, 8, 5, 10, 5.5, 0.02, 0.06, "quad-7in"}
                   : Craft{0.9, 18, 0.3, 0.0635, 0.16, 0.18, 10, 5.5, 12, 6, 0.02, 0.05, "quad-5in"};
   const double gain = between(rng, 0.7, 1.1);
-  c.kp_h *= gain, c.kp_z *= gain, c.kd_h *= std::sqrt(gain), c.kd_z *= std::sqrt(gain);
-  c.mass *= between(rng, 0.9, 1.1), c.thr_mdl_fac = between(rng, 0.1, 0.5);
+  c.kp_h *= gain;
+  c.kp_z *= gain;
+  c.kd_h *= std::sqrt(gain);
+  c.kd_z *= std::sqrt(gain);
+  c.mass *= between(rng, 0.9, 1.1);
+  c.thr_mdl_fac = between(rng, 0.1, 0.5);
   return c;
 }
 

@@ -94,7 +94,8 @@ class Flight {
     double dropout_at = std::uniform_real_distribution(0.0, 3.0)(rng_) * 60;
     if (replica > 0) {
       frozen_from = dropout_at = 1e9;
-      rng_.seed(rng_() + replica), normal_.reset();
+      rng_.seed(rng_() + replica);
+      normal_.reset();
       scatter();
     }
     for (std::size_t k = 0; k < plan.size(); ++k) {
@@ -142,7 +143,8 @@ class Flight {
     const Vec3 wanted =
         cmd.a + kp.cwiseProduct(cmd.p - believed_p) + kd.cwiseProduct(cmd.v - believed_v) + kG * Vec3::UnitZ();
     thrust_ += (wanted - thrust_) * (1 - std::exp(-kStep / (c.attitude_lag + slow - tau)));  // attitude, thrust follow
-    yaw_ = plan[k].yaw, u_ = command_of(c, c.mass * thrust_.norm());
+    yaw_ = plan[k].yaw;
+    u_ = command_of(c, c.mass * thrust_.norm());
     const double believed = thrust_of(c, u_, 0) / c.mass;
     double real = thrust_of(c, u_, world_.effects.of("thrust_slope")) / c.mass;
     if (tau > 0) {
@@ -159,7 +161,8 @@ class Flight {
     airflow(now);
     Instant half = now;
     const Vec3 a0 = acceleration(now);
-    half.p += 0.5 * kStep * v_, half.v += 0.5 * kStep * a0;
+    half.p += 0.5 * kStep * v_;
+    half.v += 0.5 * kStep * a0;
     a_ = acceleration(half);
     p_ += kStep * half.v;
     v_ += kStep * a_;
@@ -274,7 +277,8 @@ Gusts& gusts_of(const HiddenWorld& world) {
   if (const std::pair now(world.request.seed, world.request.confound); !gusts || room != now) {
     auto model = *backwash::config::load_model("builtin:" + world.craft.model);
     model.ground.r0 = world.craft.diagonal_radius;
-    gusts = std::make_unique<Gusts>(true_grid(world.room), model), room = now;
+    gusts = std::make_unique<Gusts>(true_grid(world.room), model);
+    room = now;
   }
   return *gusts;
 }

@@ -73,7 +73,10 @@ std::vector<WorldOutcome> read(const std::vector<std::string>& files) {
 }
 
 int report(const Options& options) {
-  if (options.rows) return run(options), 0;
+  if (options.rows) {
+    run(options);
+    return 0;
+  }
   const auto outcomes = options.from.empty() ? run(options) : read(options.from);
   const auto summary = summarise(outcomes);
   const std::string page = markdown(summary, outcomes);

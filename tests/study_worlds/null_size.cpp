@@ -70,7 +70,8 @@ NullSize null_size(std::uint64_t seed, int flights, const std::filesystem::path&
     const auto normal = evidence.normal({column}, free);
     if (!normal.solvable) return;
     const double p = p_value(normal, draws);
-    sizes[{name, kind}].first.count(p <= 0.05), sizes[{name, kind}].second.count(p <= 0.03);
+    sizes[{name, kind}].first.count(p <= 0.05);
+    sizes[{name, kind}].second.count(p <= 0.03);
   };
   for (int draw = 0; draw < kDraws; ++draw) {
     const auto dwell = per_dwell(seen.windows, rng), course = course_of_time(seen.windows, rng),
@@ -80,25 +81,29 @@ NullSize null_size(std::uint64_t seed, int flights, const std::filesystem::path&
       if (!seen.measured(channel)) continue;
       std::string family = study::channel_name(channel);
       if (const auto digit = family.find_last_of("1234"); digit + 1 == family.size()) family.pop_back();
-      test(family, "dwell", {channel}, dwell), test(family, "time", {channel}, course);
+      test(family, "dwell", {channel}, dwell);
+      test(family, "time", {channel}, course);
       test(family, "flight", {channel}, flight);
     }
     const std::vector<study::Channel> variances = {study::kVarX, study::kVarY, study::kVarZ};
-    test("ln variance, all axes", "dwell", variances, dwell), test("ln variance, all axes", "time", variances, course);
+    test("ln variance, all axes", "dwell", variances, dwell);
+    test("ln variance, all axes", "time", variances, course);
     test("ln variance, all axes", "flight", variances, flight);
   }
   // Family-wise: the smallest p, corrected, of all pairs of what remains.
   const auto remaining = study::remaining_dependence(evidence, {}, static_cast<unsigned>(seed));
   const double least = remaining.empty() ? 1 : remaining.front().p_holm;
   auto& left = sizes[{"what remains (HSIC, Holm)", "all"}];
-  left.first.count(least <= 0.05), left.second.count(least <= 0.03);
+  left.first.count(least <= 0.05);
+  left.second.count(least <= 0.03);
   return sizes;
 }
 
 void add(NullSize& sum, const NullSize& one) {
   for (const auto& [key, rates] : one) {
     auto& [five, three] = sum[key];
-    five.add(rates.first), three.add(rates.second);
+    five.add(rates.first);
+    three.add(rates.second);
   }
 }
 

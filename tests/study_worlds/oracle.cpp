@@ -23,7 +23,10 @@ std::vector<double> window_means(const study::Observations& seen, const std::vec
     double sum = 0, n = 0;
     for (std::size_t i = 0; i < flight.rows.size(); ++i) {
       const double t = flight.rows[i][0] - flight.rows[0][0];
-      if (std::abs(t - w.t) <= 0.5 * w.duration + beyond + 1e-9) sum += value(flight.hidden[i]), n += 1;
+      if (std::abs(t - w.t) <= 0.5 * w.duration + beyond + 1e-9) {
+        sum += value(flight.hidden[i]);
+        n += 1;
+      }
     }
     means.push_back(n > 0 ? sum / n : 0);
   }
@@ -35,7 +38,11 @@ std::vector<double> window_means(const study::Observations& seen, const std::vec
 double flown_tail(const std::vector<Table>& flights) {
   double square = 0, fourth = 0, n = 0;
   for (const auto& flight : flights)
-    for (const Hidden& h : flight.hidden) square += std::pow(h.burst, 2), fourth += std::pow(h.burst, 4), n += 1;
+    for (const Hidden& h : flight.hidden) {
+      square += std::pow(h.burst, 2);
+      fourth += std::pow(h.burst, 4);
+      n += 1;
+    }
   return std::log(n * fourth / (square * square));
 }
 
@@ -59,7 +66,10 @@ std::vector<Compared> compare(const HiddenWorld& world, const std::vector<Table>
 
 std::optional<double> parameter_error(const std::vector<Compared>& compared) {
   double off = 0, size = 0;
-  for (const auto& c : compared) off += std::pow(c.value - c.truth, 2), size += c.truth * c.truth;
+  for (const auto& c : compared) {
+    off += std::pow(c.value - c.truth, 2);
+    size += c.truth * c.truth;
+  }
   if (compared.empty()) return std::nullopt;
   return std::sqrt(off / size);
 }
@@ -102,7 +112,12 @@ double explained(const study::Observations& seen, const std::vector<Table>& flig
     for (std::size_t i = 0; i < x.size(); ++i) {
       if (!(seen.weight[channel][i] > 0)) continue;
       const double y = seen.y[channel][i];
-      n += 1, sx += x[i], sy += y, xx += x[i] * x[i], xy += x[i] * y, yy += y * y;
+      n += 1;
+      sx += x[i];
+      sy += y;
+      xx += x[i] * x[i];
+      xy += x[i] * y;
+      yy += y * y;
     }
     const double vx = xx - sx * sx / n, vy = yy - sy * sy / n, both = xy - sx * sy / n;
     if (n > 2 && vx > 0 && vy > 0) most = std::max(most, both * both / (vx * vy));

@@ -38,7 +38,10 @@ Vec3 draw_spot(const Room& room, Rng& rng, int kind, bool two_heights) {
     for (const Box& b : room.solids)
       inside_solid = inside_solid || Box{b.low - Vec3::Constant(0.25), b.high + Vec3::Constant(0.25)}.contains(p);
     const double gap = room.gap_to_ceiling(p), height = room.height_above_solid(p);
-    if (kind == 1 && std::isfinite(gap)) p.z() += gap - u(0.22, 0.4), inside_solid = p.z() < 0.9;
+    if (kind == 1 && std::isfinite(gap)) {
+      p.z() += gap - u(0.22, 0.4);
+      inside_solid = p.z() < 0.9;
+    }
     if (!inside_solid && height > 0.25) return p;
   }
 }
@@ -76,7 +79,8 @@ std::vector<Command> bobbing_plan(const HiddenWorld& world, Rng& rng) {
     const Vec3 next = spot();
     const double turned = u(-M_PI, M_PI);
     append_line(plan, at, next, yaw, turned, 1.0);
-    at = next, yaw = turned;
+    at = next;
+    yaw = turned;
   }
   return plan;
 }
@@ -108,7 +112,8 @@ std::vector<Command> draw_plan(const HiddenWorld& world, Rng& rng) {
       append_line(plan, {at.x(), at.y(), z}, {next.x(), next.y(), z}, yaw, turned, a_max, v_max);
       append_line(plan, {next.x(), next.y(), z}, next, turned, turned, a_max);
     }
-    at = next, yaw = turned;
+    at = next;
+    yaw = turned;
   }
   return plan;
 }

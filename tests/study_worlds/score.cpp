@@ -81,7 +81,9 @@ bool WorldOutcome::right() const {
 WorldOutcome score(const MatrixCell& cell, std::uint64_t seed, double size, int flights,
                    const std::filesystem::path& folder) {
   WorldOutcome out;
-  out.cell = cell.name, out.seed = seed, out.size = size;
+  out.cell = cell.name;
+  out.seed = seed;
+  out.size = size;
   out.truth = cell.two_drawn ? two_causes(seed) : cell.causes;
   const HiddenWorld world = draw_world({seed, out.truth, size, flights, cell.confound});
   auto options = cell.reference ? with_reference(world, folder) : backwash::study::StudyOptions();
@@ -91,12 +93,15 @@ WorldOutcome score(const MatrixCell& cell, std::uint64_t seed, double size, int 
   const double observed = cpu();
   options.minimum_detectable = false;
   const auto result = backwash::study::study(seen, options);
-  out.world_s = observed - start, out.study_s = cpu() - observed;
+  out.world_s = observed - start;
+  out.study_s = cpu() - observed;
   out.sets = sets_of(result);
   for (const auto& cause : result.causes) out.where.push_back(backwash::study::where(cause));
   for (const auto& u : result.unknown) out.unknown.push_back(u.along);
-  if (holds(out.truth, "unknown"))
-    out.structure = text_of(world.effects.structure), out.explained = explained(seen, tables);
+  if (holds(out.truth, "unknown")) {
+    out.structure = text_of(world.effects.structure);
+    out.explained = explained(seen, tables);
+  }
   if (out.truth.size() != 1) return out;
   for (const auto& cause : result.causes) {
     if (cause.found.form->cause() != out.truth.front()) continue;
@@ -118,7 +123,10 @@ nlohmann::json to_json(const WorldOutcome& o) {
     json["compared"].push_back(one);
   }
   if (std::ranges::any_of(o.where, [](auto& w) { return !w.empty(); })) json["where"] = o.where;
-  if (!o.structure.empty()) json["structure"] = o.structure, json["explained"] = o.explained;
+  if (!o.structure.empty()) {
+    json["structure"] = o.structure;
+    json["explained"] = o.explained;
+  }
   if (o.error) json["parameter_error"] = *o.error;
   if (o.gain_share) json["gain_share"] = *o.gain_share;
   return json;
@@ -126,17 +134,21 @@ nlohmann::json to_json(const WorldOutcome& o) {
 
 WorldOutcome from_json(const nlohmann::json& json) {
   WorldOutcome o;
-  o.cell = json.at("cell"), o.seed = json.at("seed"), o.size = json.at("size");
+  o.cell = json.at("cell");
+  o.seed = json.at("seed");
+  o.size = json.at("size");
   o.truth = json.at("truth").get<std::vector<std::string>>();
   o.sets = json.at("sets").get<std::vector<std::vector<std::string>>>();
   o.unknown = json.at("unknown").get<std::vector<std::string>>();
-  o.study_s = json.at("study_s"), o.world_s = json.at("world_s");
+  o.study_s = json.at("study_s");
+  o.world_s = json.at("world_s");
   for (const auto& c : json.value("compared", nlohmann::json::array())) {
     o.compared.push_back({c.at("name"), c.at("value"), c.at("ci95").at(0), c.at("ci95").at(1), c.at("truth"), {}});
     if (c.contains("best_of_form")) o.compared.back().best = c.at("best_of_form").get<double>();
   }
   o.where = json.value("where", std::vector<std::string>());
-  o.structure = json.value("structure", ""), o.explained = json.value("explained", 1.0);
+  o.structure = json.value("structure", "");
+  o.explained = json.value("explained", 1.0);
   if (json.contains("parameter_error")) o.error = json.at("parameter_error").get<double>();
   if (json.contains("gain_share")) o.gain_share = json.at("gain_share").get<double>();
   return o;

@@ -50,7 +50,9 @@ void break_rotor(std::vector<Table>& flights, const std::vector<int>& which, std
 SharedOutcome score(const SharedFault& hidden, std::uint64_t seed, const std::filesystem::path& folder) {
   std::mt19937_64 rng(seed * 48271 + 5);
   SharedOutcome out;
-  out.hidden = hidden, out.seed = seed, out.truth = drawn_flights(hidden, rng);
+  out.hidden = hidden;
+  out.seed = seed;
+  out.truth = drawn_flights(hidden, rng);
   if (hidden.layout == "since") out.since_s = std::uniform_real_distribution(20.0, 60.0)(rng);
   const bool rpm = hidden.fault == "rpm";
   Request request{seed, {}, hidden.size, kFlights, "", out.truth, out.since_s};
@@ -102,7 +104,10 @@ std::string shares_table(const std::vector<SharedOutcome>& outcomes) {
   std::map<std::tuple<std::string, double, std::string, int>, Row> rows;
   for (const auto& o : outcomes) {
     Row& row = rows[{o.hidden.fault, o.hidden.size, o.hidden.layout, o.hidden.count}];
-    row.found.count(o.found), row.exact.count(o.exact()), row.rotor.count(o.found && o.rotor), row.wrong.count(o.wrong);
+    row.found.count(o.found);
+    row.exact.count(o.exact());
+    row.rotor.count(o.found && o.rotor);
+    row.wrong.count(o.wrong);
     if (o.found && o.hidden.layout == "since" && o.told_since_s >= 0)
       row.late.push_back(std::abs(o.told_since_s - o.since_s));
   }

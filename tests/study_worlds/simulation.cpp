@@ -117,13 +117,18 @@ void compare(Proof& proof, const study::Accepted& found, const study::Observatio
     if (!(eo > 0) || !(eb > 0)) continue;
     if (n == 0) {
       proof.channel = study::channel_name(c);
-      proof.unit_before = eb, proof.unit_after = ea, proof.unit_oracle = eo;
+      proof.unit_before = eb;
+      proof.unit_after = ea;
+      proof.unit_oracle = eo;
     }
-    b += std::pow(eb / eo, 2), a += std::pow(ea / eo, 2), n += 1;
+    b += std::pow(eb / eo, 2);
+    a += std::pow(ea / eo, 2);
+    n += 1;
   }
   if (n == 0) return;
   proof.simulated = true;
-  proof.before = std::sqrt(b / n), proof.after = std::sqrt(a / n);
+  proof.before = std::sqrt(b / n);
+  proof.after = std::sqrt(a / n);
   proof.share = b > n ? (b - a) / (b - n) : 0;
 }
 
@@ -143,7 +148,8 @@ std::string number(double x) {
 
 Proof prove(const ProofRequest& request, const std::filesystem::path& folder) {
   Proof proof;
-  proof.cause = request.cause, proof.seed = request.seed;
+  proof.cause = request.cause;
+  proof.seed = request.seed;
   HiddenWorld world = draw_world({request.seed, {request.cause}, 1, 2 * request.flights, ""});
   world.craft.rotor_spread = 0.01;  // how a craft is built is no term of a simulation
   const auto all = fly_all(world);
@@ -189,10 +195,19 @@ nlohmann::json to_json(const Proof& p) {
 
 Proof proof_from_json(const nlohmann::json& json) {
   Proof p;
-  p.cause = json.at("cause"), p.seed = json.at("seed"), p.told = json.at("told"), p.refused = json.at("refused");
-  p.simulated = json.at("simulated"), p.before = json.at("before"), p.after = json.at("after");
-  p.share = json.at("share"), p.channel = json.at("channel"), p.told_after = json.at("told_after");
-  p.unit_before = json.at("unit").at(0), p.unit_after = json.at("unit").at(1), p.unit_oracle = json.at("unit").at(2);
+  p.cause = json.at("cause");
+  p.seed = json.at("seed");
+  p.told = json.at("told");
+  p.refused = json.at("refused");
+  p.simulated = json.at("simulated");
+  p.before = json.at("before");
+  p.after = json.at("after");
+  p.share = json.at("share");
+  p.channel = json.at("channel");
+  p.told_after = json.at("told_after");
+  p.unit_before = json.at("unit").at(0);
+  p.unit_after = json.at("unit").at(1);
+  p.unit_oracle = json.at("unit").at(2);
   return p;
 }
 
@@ -208,11 +223,18 @@ std::string proof_table(const std::vector<Proof>& proofs) {
     std::string channel;
     for (const auto& p : proofs) {
       if (p.cause != cause) continue;
-      ++worlds, nothing += p.told_after == "nothing" ? 1 : 0;
-      named += p.simulated || !p.refused.empty() ? 1 : 0, refused += p.refused.empty() ? 0 : 1;
+      ++worlds;
+      nothing += p.told_after == "nothing" ? 1 : 0;
+      named += p.simulated || !p.refused.empty() ? 1 : 0;
+      refused += p.refused.empty() ? 0 : 1;
       if (!p.simulated) continue;
-      before.push_back(p.before), after.push_back(p.after), share.push_back(p.share), channel = p.channel;
-      ub.push_back(p.unit_before), ua.push_back(p.unit_after), uo.push_back(p.unit_oracle);
+      before.push_back(p.before);
+      after.push_back(p.after);
+      share.push_back(p.share);
+      channel = p.channel;
+      ub.push_back(p.unit_before);
+      ua.push_back(p.unit_after);
+      uo.push_back(p.unit_oracle);
       within += p.after <= kAsTruth ? 1 : 0;
     }
     if (worlds == 0) continue;

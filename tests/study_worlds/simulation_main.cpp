@@ -30,7 +30,8 @@ std::vector<Proof> run(const Options& options) {
   std::ofstream out(options.out, std::ios::app);
   in_parallel(options.jobs, count, [&](std::size_t k, auto& folder) {
     ProofRequest request = options.request;
-    request.cause = causes[k % causes.size()], request.seed += k / causes.size();
+    request.cause = causes[k % causes.size()];
+    request.seed += k / causes.size();
     auto proof = prove(request, folder);
     const std::lock_guard lock(writing);
     if (out) out << to_json(proof).dump() << std::endl;

@@ -60,10 +60,13 @@ HiddenStructure draw_structure(std::mt19937_64& rng) {
   if (s.kind == Kind::tone) s.number[0] = 2 * M_PI * std::exp(between(rng, std::log(0.02), std::log(0.2)));
   if (s.kind == Kind::heading) {  // a level push that turns once with the heading is a trim
     const int least = s.where == Where::level ? 2 : 1;
-    s.along[0] = Quantity::yaw, s.number[0] = least + one_of(rng, 6 - least);
+    s.along[0] = Quantity::yaw;
+    s.number[0] = least + one_of(rng, 6 - least);
   }
-  if (s.kind == Kind::wave)
-    s.along[0] = static_cast<Quantity>(one_of(rng, 3)), s.number[0] = 2 * M_PI / between(rng, 0.9, 2.5);
+  if (s.kind == Kind::wave) {
+    s.along[0] = static_cast<Quantity>(one_of(rng, 3));
+    s.number[0] = 2 * M_PI / between(rng, 0.9, 2.5);
+  }
   if (s.kind == Kind::product) {
     const int first = one_of(rng, 6), second = (first + 1 + one_of(rng, 5)) % 6;
     s.along = {static_cast<Quantity>(first), static_cast<Quantity>(second)};

@@ -101,7 +101,9 @@ std::vector<CellSummary> summarise(const std::vector<WorldOutcome>& outcomes) {
     std::map<std::string, int> told_counts;
     for (const WorldOutcome& o : outcomes) {
       if (row_of(o) != name) continue;
-      s.right.count(o.right()), s.in_sets.count(o.in_sets()), s.wrong_name.count(o.wrong_name());
+      s.right.count(o.right());
+      s.in_sets.count(o.in_sets());
+      s.wrong_name.count(o.wrong_name());
       s.silent.count(o.silent());
       s.ambiguous.count(std::any_of(o.sets.begin(), o.sets.end(), [](auto& set) { return set.size() > 1; }));
       for (const auto& c : o.compared) {
@@ -113,7 +115,8 @@ std::vector<CellSummary> summarise(const std::vector<WorldOutcome>& outcomes) {
       ++told_counts[told(o.sets, o.unknown)];
     }
     if (s.right.n == 0) continue;
-    std::sort(s.errors.begin(), s.errors.end()), std::sort(s.gain_shares.begin(), s.gain_shares.end());
+    std::sort(s.errors.begin(), s.errors.end());
+    std::sort(s.gain_shares.begin(), s.gain_shares.end());
     for (const auto& [what, count] : told_counts) s.told.emplace_back(count, what);
     std::sort(s.told.begin(), s.told.end(), [](auto& a, auto& b) { return a.first > b.first; });
     all.push_back(std::move(s));
@@ -129,7 +132,10 @@ std::vector<Requirement> gates(const std::vector<CellSummary>& cells) {
   const auto alarms = [](const CellSummary& c) { return text(Rate{c.silent.n - c.silent.hits, c.silent.n}); };
   Rate covered, best;
   for (const auto& c : cells)
-    if (plain(c)) covered.add(c.covered), best.add(c.covered_best);
+    if (plain(c)) {
+      covered.add(c.covered);
+      best.add(c.covered_best);
+    }
   std::vector<Requirement> all = {
       over("false alarms: 95 % upper limit ≤ 0.08", cells, is("none"), alarms,
            [](auto& c) {
@@ -178,9 +184,13 @@ std::string markdown(const std::vector<CellSummary>& cells, const std::vector<Wo
     page += "| " + g.name + " | " + g.figure + " | " + (g.held ? "yes" : "**no**") + " |\n";
   std::vector<double> search, world;
   for (const auto& o : outcomes)
-    if (o.study_s > 0) search.push_back(o.study_s), world.push_back(o.world_s);  // rows of a campaign have no times
+    if (o.study_s > 0) {
+      search.push_back(o.study_s);
+      world.push_back(o.world_s);
+    }  // rows of a campaign have no times
   if (search.empty()) return page;
-  std::sort(search.begin(), search.end()), std::sort(world.begin(), world.end());
+  std::sort(search.begin(), search.end());
+  std::sort(world.begin(), world.end());
   return page + text("\nCPU a study, median and slowest: %.2f s and %.2f s; flying and observing its world %.2f s.\n",
                      median(search), search.back(), median(world));
 }

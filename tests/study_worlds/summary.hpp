@@ -12,8 +12,14 @@ namespace study_worlds {
 /// Hits among trials with Wilson's 95 % interval.
 struct Rate {
   int hits = 0, n = 0;
-  void count(bool hit) { hits += hit ? 1 : 0, ++n; }
-  void add(const Rate& other) { hits += other.hits, n += other.n; }
+  void count(bool hit) {
+    hits += hit ? 1 : 0;
+    ++n;
+  }
+  void add(const Rate& other) {
+    hits += other.hits;
+    n += other.n;
+  }
   double low() const;
   double high() const;
 };

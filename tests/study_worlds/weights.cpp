@@ -49,10 +49,20 @@ HiddenWorld drawn_world(const RotorTrial& trial, const Request& request, std::mt
   const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
   HiddenWorld world = draw_world(request);
   Craft& c = world.craft;
-  if (trial.craft == "quad-7in") c.mass = 1.9, c.max_thrust = 38, c.model = trial.craft;
-  if (trial.craft == "quad-5in") c.mass = 0.9, c.max_thrust = 18, c.model = trial.craft;
+  if (trial.craft == "quad-7in") {
+    c.mass = 1.9;
+    c.max_thrust = 38;
+    c.model = trial.craft;
+  }
+  if (trial.craft == "quad-5in") {
+    c.mass = 0.9;
+    c.max_thrust = 18;
+    c.model = trial.craft;
+  }
   if (trial.craft != "drawn") return world;
-  c.mass *= u(0.6, 1.5), c.max_thrust = c.mass * 9.81 * u(1.9, 3.5), c.thr_mdl_fac = u(0.05, 0.8);
+  c.mass *= u(0.6, 1.5);
+  c.max_thrust = c.mass * 9.81 * u(1.9, 3.5);
+  c.thr_mdl_fac = u(0.05, 0.8);
   return world;
 }
 
@@ -62,7 +72,8 @@ RotorOutcome score(const RotorTrial& trial, std::uint64_t seed, const std::files
   std::mt19937_64 rng(seed * 69621 + 11);
   const auto u = [&](double low, double high) { return std::uniform_real_distribution(low, high)(rng); };
   RotorOutcome out;
-  out.trial = trial, out.seed = seed;
+  out.trial = trial;
+  out.seed = seed;
   const std::size_t rotor = rng() % 4;
   const std::uint64_t of_craft = trial.craft == "drawn" ? 2 : trial.craft == "quad-7in" ? 1 : 0;
   const Request request{3 * seed + of_craft, {}, 1, 12, ""};
@@ -93,7 +104,8 @@ RotorOutcome score(const RotorTrial& trial, std::uint64_t seed, const std::files
     const bool alone = cause.found.rivals.empty();
     bool holds = name == truth;
     for (const auto& r : cause.found.rivals) holds = holds || r.name == truth;
-    out.in_set = out.in_set || holds, out.right_alone = out.right_alone || (alone && name == truth);
+    out.in_set = out.in_set || holds;
+    out.right_alone = out.right_alone || (alone && name == truth);
     const bool of_rotors = cause.found.form->integer_scale;
     out.wrong = out.wrong || (alone && of_rotors && name != truth);
   }
@@ -113,7 +125,9 @@ std::string weights_table(const std::vector<RotorOutcome>& outcomes) {
   std::map<std::tuple<std::string, std::string, bool>, Row> rows;
   for (const auto& o : outcomes) {
     Row& row = rows[{o.trial.hidden, o.trial.craft, o.trial.reference}];
-    row.wrong.count(o.wrong), row.in_set.count(o.in_set), row.alone.count(o.right_alone);
+    row.wrong.count(o.wrong);
+    row.in_set.count(o.in_set);
+    row.alone.count(o.right_alone);
   }
   std::ostringstream text;
   text << "| hidden | craft | reference flights | wrong name, alone | truth in a set | right name alone |\n"

@@ -67,7 +67,10 @@ class DiagnosticsType : public ReadType {
     if (number<std::uint32_t>(cdr) != 1) return "not one status";
     const int level = number<std::uint8_t>(cdr);
     const std::string name = text(cdr), message = text(cdr), hardware = text(cdr);
-    for (auto values = number<std::uint32_t>(cdr); values > 0; --values) text(cdr), text(cdr);
+    for (auto values = number<std::uint32_t>(cdr); values > 0; --values) {
+      text(cdr);
+      text(cdr);
+    }
     return "diagnostics " + std::to_string(level) + " " + hardware + " " + name + ": " + message;
   }
 };
@@ -95,10 +98,13 @@ class MarkersType : public ReadType {
       skip<double>(cdr, std::size_t{3} * points);
       skip<float>(cdr, std::size_t{4} * number<std::uint32_t>(cdr));  // colours
       text(cdr);                                                      // texture_resource
-      header(cdr), text(cdr);                                         // texture
+      header(cdr);
+      text(cdr);  // texture
       skip<std::uint8_t>(cdr, number<std::uint32_t>(cdr));
       skip<float>(cdr, std::size_t{2} * number<std::uint32_t>(cdr));  // uv_coordinates
-      text(cdr), text(cdr), text(cdr);                                // text, mesh_resource, mesh_file.filename
+      text(cdr);
+      text(cdr);
+      text(cdr);  // text, mesh_resource, mesh_file.filename
       skip<std::uint8_t>(cdr, number<std::uint32_t>(cdr));
       number<bool>(cdr);  // mesh_use_embedded_materials
       if (action == 0 && type == 4) line = points;
@@ -129,14 +135,17 @@ class CloudType : public ReadType {
     const auto step = number<std::uint32_t>(cdr), row = number<std::uint32_t>(cdr), bytes = number<std::uint32_t>(cdr);
     if (big_endian || height != 1 || step != 20 || row != width * step || bytes != row) return "other sizes";
     std::array<float, 5> least, largest;
-    least.fill(1e9F), largest.fill(-1e9F);
+    least.fill(1e9F);
+    largest.fill(-1e9F);
     for (std::uint32_t n = 0; n < width; ++n) {
       std::array<std::uint8_t, 20> raw;
       for (auto& byte : raw) byte = number<std::uint8_t>(cdr);
       std::array<float, 5> point;
       std::memcpy(point.data(), raw.data(), raw.size());
-      for (std::size_t k = 0; k < 5; ++k)
-        least[k] = std::min(least[k], point[k]), largest[k] = std::max(largest[k], point[k]);
+      for (std::size_t k = 0; k < 5; ++k) {
+        least[k] = std::min(least[k], point[k]);
+        largest[k] = std::max(largest[k], point[k]);
+      }
     }
     char said[200];
     std::snprintf(
@@ -181,7 +190,8 @@ class PathType : public ReadType {
       for (double& v : pose) v = number<double>(cdr);
       if (std::abs(std::hypot(std::hypot(pose[3], pose[4]), std::hypot(pose[5], pose[6])) - 1) > 1e-9) return "no turn";
       const double step = n == 0 ? 0 : std::hypot(pose[0] - last[0], pose[1] - last[1], pose[2] - last[2]);
-      length += step, longest = std::max(longest, step);
+      length += step;
+      longest = std::max(longest, step);
     }
     char said[160];
     std::snprintf(said, sizeof said, "path %u in %s to %.2f %.2f %.2f, %.3f m, %.3f m at a time", count, frame.c_str(),

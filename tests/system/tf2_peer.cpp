@@ -123,7 +123,9 @@ struct Judged {
   double metres = 0, radians = 0;
   void take(const Pose& seen, const Pose& wanted) {
     const auto [m, r] = apart(seen, wanted);
-    ++asked, metres = std::max(metres, m), radians = std::max(radians, r);
+    ++asked;
+    metres = std::max(metres, m);
+    radians = std::max(radians, r);
   }
 };
 

@@ -54,7 +54,8 @@ TEST(FrameAlignmentLimits, TellsAResetFromNoiseByPositionAndByHeading) {
   const FrameAlignment alignment = watched(Vec3::Zero(), 0);
   const auto off = [&](const Vec3& by, double turned) {
     FramePose local = truth.local(map);
-    local.p += by, local.yaw += turned;
+    local.p += by;
+    local.yaw += turned;
     return alignment.reset_between(map, local);
   };
   EXPECT_FALSE(off({0, 0.14, 0}, 0));

@@ -29,7 +29,8 @@ inline reach::ReachTube tube_of(const std::vector<Setpoint>& commands) {
   reach::ReachTube tube(commands.size() + 1);
   for (std::size_t k = 0; k < tube.size(); ++k) {
     tube[k].center.p_W = commands[std::min(k, commands.size() - 1)].p_W;
-    tube[k].half_widths.fill(0.2), tube[k].half_widths_interval.fill(0.2);
+    tube[k].half_widths.fill(0.2);
+    tube[k].half_widths_interval.fill(0.2);
   }
   return tube;
 }
@@ -181,7 +182,8 @@ inline AcceptedSegment take_off() {
   s.tube.resize(s.commands.size() + 1);
   for (std::size_t k = 0; k < s.tube.size(); ++k) {
     s.tube[k].center.p_W = s.commands[std::min(k, s.commands.size() - 1)].p_W;
-    s.tube[k].half_widths.fill(0.2), s.tube[k].half_widths_interval.fill(0.2);
+    s.tube[k].half_widths.fill(0.2);
+    s.tube[k].half_widths_interval.fill(0.2);
   }
   return s;
 }

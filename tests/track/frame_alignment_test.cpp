@@ -42,7 +42,10 @@ TEST(FrameAlignment, NoticesWithinAFewTicksThatTheControllerReset) {
   FramePose jumped = truth.local(map);
   jumped.p.x() += 0.8;
   int ticks = 0;
-  while (alignment.aligned() && ticks < 50) alignment.update(map, jumped, kControlPeriod, false), ++ticks;
+  while (alignment.aligned() && ticks < 50) {
+    alignment.update(map, jumped, kControlPeriod, false);
+    ++ticks;
+  }
   EXPECT_LE(ticks, 2);
 }
 
@@ -129,7 +132,10 @@ TEST(FrameAlignment, IsNotAlignedWhileTheAttitudesAreTilted) {
   FramePose tilted{};
   tilted.up_B = Eigen::AngleAxisd(0.17, Vec3(1, 1, 0).normalized()) * Vec3::UnitZ();
   int ticks = 0;
-  while (alignment.aligned() && ticks < 50) alignment.update(tilted, {}, kControlPeriod, false), ++ticks;
+  while (alignment.aligned() && ticks < 50) {
+    alignment.update(tilted, {}, kControlPeriod, false);
+    ++ticks;
+  }
   EXPECT_LE(ticks, 8);
 }
 

@@ -37,7 +37,11 @@ TEST(FrameMismatch, FramesThatMatchShowNone) {
 TEST(FrameMismatch, NamesTheAxisThatIsMirroredOrDead) {
   const Mismatch names[] = {Mismatch::x, Mismatch::y, Mismatch::z};
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_EQ(after([=](auto& l) { l.p[axis] *= -1, l.v[axis] *= -1; }), names[axis]);
+    EXPECT_EQ(after([=](auto& l) {
+                l.p[axis] *= -1;
+                l.v[axis] *= -1;
+              }),
+              names[axis]);
     EXPECT_EQ(after([=](auto& l) { l.v[axis] = 0; }), names[axis]);
   }
 }
@@ -46,7 +50,8 @@ TEST(FrameMismatch, NamesAYawOfMoreThanTenDegrees) {
   const auto turned = [](double degrees) {
     return after([=](auto& l) {
       const Eigen::AngleAxisd R(degrees * std::numbers::pi / 180, Vec3::UnitZ());
-      l.p = R * l.p, l.v = R * l.v;  // the heading is right, the motion is in another frame
+      l.p = R * l.p;
+      l.v = R * l.v;  // the heading is right, the motion is in another frame
     });
   };
   for (const double sign : {-1.0, 1.0}) {

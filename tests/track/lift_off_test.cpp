@@ -156,11 +156,13 @@ TEST(LiftOff, OnAPoseThatFrozeOnTheGroundLandsOnceTheVehicleMustHaveLeftIt) {
   std::optional<OdometrySample> frozen;
   f.spoil = [&](OdometrySample& s) {
     if (!frozen) frozen = s;
-    s.state = {frozen->state.p_W, Vec3::Zero()}, s.q = frozen->q;
+    s.state = {frozen->state.p_W, Vec3::Zero()};
+    s.q = frozen->q;
   };
   const auto in_the_air = [&f](int ticks) {
     for (int n = 0; n < ticks && f.out.supervisor.mode == Mode::lifting; ++n) {
-      f.out.command_local.p_W = f.ground_L + f.off_L, f.out.command_local.v_W = Vec3::Zero();  // as it believes
+      f.out.command_local.p_W = f.ground_L + f.off_L;
+      f.out.command_local.v_W = Vec3::Zero();  // as it believes
       f.in.autopilot.landed = false;
       f.in.autopilot.in_air = true;
       f.step();
@@ -196,7 +198,8 @@ TEST(LiftOff, StaysInItsColumnAcrossALoopClosureAndIsOverAtItsHeight) {
   f.at(0.3, true);
   f.closures = 1;  // the first one of all leaves the map where it is
   f.at(0.3, true);
-  f.closures = 2, f.frame_W = {0.1, {0.5, -0.3, 0.4}};
+  f.closures = 2;
+  f.frame_W = {0.1, {0.5, -0.3, 0.4}};
   for (int n = 0; n < 60; ++n) ASSERT_EQ(f.at(0.3, true).supervisor.mode, Mode::lifting) << n;
   EXPECT_EQ(f.tick.tracker().closures(), 2u);
   f.settle(0.55, true);

@@ -164,7 +164,10 @@ TEST(SlowFrameAlignment, ResidualsGrowAsFastByTheClock) {
     FramePose off;
     off.p.x() = 0.12;
     int n = 0;
-    while (frames.position_residual() < 0.1) frames.update(here, off, 1 / rate, false), ++n;
+    while (frames.position_residual() < 0.1) {
+      frames.update(here, off, 1 / rate, false);
+      ++n;
+    }
     return n / rate;
   };
   EXPECT_LE(seconds_to(10, k10Hz), seconds_to(20, {}) + 0.1);

@@ -54,14 +54,18 @@ TEST(Orders, AnOperatorLandsAnArmedVehicleInOurModeThatNobodyCommands) {
     for (const bool ours : {true, false}) {
       Supervisor s;
       SupervisorInput in = healthy();
-      in.armed = true, in.offboard = ours;
+      in.armed = true;
+      in.offboard = ours;
       EXPECT_FALSE(s.step(in).send_heartbeat) << "it belongs to somebody else until an operator says so";
       in.request = request;
       auto out = s.step(in);
       in.request = Request::none;
       EXPECT_EQ(out.mode, ours ? Mode::land : Mode::passive);
       bool asked = false;
-      for (int n = 0; n < 10; ++n) asked = asked || out.request_land, out = s.step(in);
+      for (int n = 0; n < 10; ++n) {
+        asked = asked || out.request_land;
+        out = s.step(in);
+      }
       EXPECT_EQ(asked, ours);
     }
   }

@@ -99,7 +99,10 @@ TEST(PoseDrift, IsLeftByChanceAsSeldomAsTheLimitIsDerivedFrom) {
   double settles = 0;
   for (double t = 0; t < hours * 3600; t += kDt) {
     const Vec3 wander(normal(random), normal(random), normal(random));
-    if (!drift.explains({kDt, wander, Vec3::Zero(), Vec3::Zero(), error}) && t > settles) ++left, settles = t + 3;
+    if (!drift.explains({kDt, wander, Vec3::Zero(), Vec3::Zero(), error}) && t > settles) {
+      ++left;
+      settles = t + 3;
+    }
   }
   const double expected = hours * 3600 * rate(k, 1);
   EXPECT_LT(left, expected);
@@ -116,7 +119,10 @@ TEST(PoseDrift, TurnsWithTheMap) {
     bool moved = false;
     return found_after(drift, 60, [&](double t) {
       PoseDrift::Step step = drifting(0.05, 0.005);
-      if (t >= 1 && !moved) drift.rebase(D), moved = true;
+      if (t >= 1 && !moved) {
+        drift.rebase(D);
+        moved = true;
+      }
       if (moved) step.moved = D.rotate(step.moved);
       return step;
     });

@@ -196,7 +196,11 @@ TEST(SupervisorFacts, WhatComesUpWhileEnablingEndsIt) {
   } rows[] = {
       {Reason::operator_request, [](auto& in) { in.request = Request::disable; }},
       {Reason::operator_request, [](auto& in) { in.request = Request::stop; }},
-      {Reason::operator_request, [](auto& in) { in.request = Request::stop, in.armed = true; }},
+      {Reason::operator_request,
+       [](auto& in) {
+         in.request = Request::stop;
+         in.armed = true;
+       }},
       {Reason::odometry_lost, [](auto& in) { in.odometry_age = 0.081; }},
       {Reason::odometry_jump, [](auto& in) { in.odometry_jump = true; }},
       {Reason::odometry_inconsistent, [](auto& in) { in.odometry_inconsistent = true; }},

@@ -55,7 +55,10 @@ TEST(TickReactions, HowFarFramesMayComeApartIsWhatBothEstimatesSayWithinLimits) 
 
 TEST(TickReactions, FramesThatCameApartAreFlownInAgainOnceTheyAreTogether) {
   Flown f(Flown::Until::tracking);
-  for (int n = 0; f.out.supervisor.mode == Mode::tracking && n < 400; ++n) f.local_off.y() += 0.001, f.step();
+  for (int n = 0; f.out.supervisor.mode == Mode::tracking && n < 400; ++n) {
+    f.local_off.y() += 0.001;
+    f.step();
+  }
   ASSERT_EQ(f.out.supervisor.reason, Reason::frames_apart);
   AcceptedSegment s = straight();
   s.tube.front().center = Flown::map_of(f.truth_L);
@@ -76,7 +79,8 @@ TEST(TickReactions, FramesThatCameApartAreFlownInAgainOnceTheyAreTogether) {
 TEST(TickReactions, ALoopClosureMovesMapAndFlightTogetherAndNothingPhysically) {
   const RigidShift first{0.1, {1, -1, 0.2}}, second{0.13, {1.3, -1.2, 0.25}};
   Flown f(Flown::Until::aligned);
-  f.closures = 1, f.frame_W = first;
+  f.closures = 1;
+  f.frame_W = first;
   for (int n = 0; n < 60; ++n) f.step();  // the frames are learnt anew
   f.in.request = Request::enable;
   f.step();
@@ -94,7 +98,8 @@ TEST(TickReactions, ALoopClosureMovesMapAndFlightTogetherAndNothingPhysically) {
   const RigidShift D = second * first.inverse();
   const Setpoint map_before = f.out.command;
   Setpoint before = f.out.command_local;
-  f.closures = 2, f.frame_W = second;
+  f.closures = 2;
+  f.frame_W = second;
   for (int n = 0; n < 100; ++n) {
     f.step();
     ASSERT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason) << " " << n;
@@ -109,7 +114,9 @@ TEST(TickReactions, ALoopClosureMovesMapAndFlightTogetherAndNothingPhysically) {
   }
   EXPECT_LT(f.tick.alignment().position_residual(), 0.002);
   AcceptedSegment old = f.segment;
-  old.id = 2, old.continues = 1, old.branch = 350;
+  old.id = 2;
+  old.continues = 1;
+  old.branch = 350;
   EXPECT_TRUE(f.offer(old).refused) << "it is of the map before the closure";
   old.closures = 2;
   EXPECT_TRUE(f.offer(old).accepted);
@@ -119,7 +126,8 @@ TEST(TickReactions, ALoopClosureMovesMapAndFlightTogetherAndNothingPhysically) {
 TEST(TickReactions, ALoopClosureMovesWhatIsHeld) {
   const RigidShift first{0.1, {1, -1, 0.2}}, second{0.13, {1.3, -1.2, 0.25}};
   Flown f(Flown::Until::aligned);
-  f.closures = 1, f.frame_W = first;
+  f.closures = 1;
+  f.frame_W = first;
   for (int n = 0; n < 60; ++n) f.step();
   f.in.request = Request::enable;
   f.step();
@@ -127,7 +135,8 @@ TEST(TickReactions, ALoopClosureMovesWhatIsHeld) {
   for (int n = 0; n < 100; ++n) f.step();
   ASSERT_EQ(f.out.supervisor.mode, Mode::tracking) << to_string(f.out.supervisor.reason);
   const Setpoint before = f.out.command, local = f.out.command_local;
-  f.closures = 2, f.frame_W = second;
+  f.closures = 2;
+  f.frame_W = second;
   f.step();
   EXPECT_LT((f.out.command.p_W - (second * first.inverse()).point(before.p_W)).norm(), 1e-9);
   EXPECT_LT((f.out.command_local.p_W - local.p_W).norm(), 1e-6);
@@ -152,7 +161,8 @@ TEST(TickReactions, WhileTheFramesDisagreeTheyAreNotTakenAnew) {
 /// A flight at rest in a map that has seen one loop closure already.
 Flown after_a_closure(const RigidShift& first) {
   Flown f(Flown::Until::aligned);
-  f.closures = 1, f.frame_W = first;
+  f.closures = 1;
+  f.frame_W = first;
   for (int n = 0; n < 60; ++n) f.step();
   f.in.request = Request::enable;
   f.step();
@@ -169,7 +179,8 @@ TEST(TickReactions, AnAbsurdLoopClosureIsHeldAndNothingIsFlownAfterIt) {
     const Setpoint before = f.out.command, local = f.out.command_local;
     RigidShift D{turn ? 0.2 : 0.0, {turn ? 0.0 : 1.2, 0, 0}};
     if (turn) D.t = before.p_W - D.rotate(before.p_W);  // about the vehicle: it stays where it is
-    f.closures = 2, f.frame_W = D * first;
+    f.closures = 2;
+    f.frame_W = D * first;
     f.step();
     EXPECT_EQ(f.out.supervisor.mode, Mode::hold);
     EXPECT_EQ(f.out.supervisor.reason, Reason::closure_refused);
@@ -191,7 +202,8 @@ TEST(TickReactions, AHoldInTheTickOfALoopClosureIsWhereItPhysicallyWas) {
   const RigidShift first{0.1, {1, -1, 0.2}};
   Flown f = after_a_closure(first);
   const Setpoint local = f.out.command_local;
-  f.closures = 2, f.frame_W = RigidShift{0.13, {1.3, -1.2, 0.25}};
+  f.closures = 2;
+  f.frame_W = RigidShift{0.13, {1.3, -1.2, 0.25}};
   f.in.surroundings.outside = true;
   f.step();
   ASSERT_EQ(f.out.supervisor.mode, Mode::hold);

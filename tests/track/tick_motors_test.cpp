@@ -71,7 +71,10 @@ TEST(TickReactions, AStopOnTheGroundStopsTheMotorsThereAndOnlyUntilTheNextTakeof
   Flown h = on_the_ground();
   AcceptedSegment again = take_off();
   again.id = 2;
-  for (auto& command : again.commands) command = again.commands[0], command.v_W.setZero();  // as high as before
+  for (auto& command : again.commands) {
+    command = again.commands[0];
+    command.v_W.setZero();
+  }  // as high as before
   h.in.autopilot.landed = true;
   EXPECT_EQ(disarms(h,
                     [&] {

@@ -22,7 +22,10 @@ TEST(TickReactions, OdometryThatStopsHoldsWithin100MillisecondsOfItsReception) {
   Flown f;
   f.vio_on = false;
   int ticks = 0;
-  while (f.out.supervisor.mode == Mode::tracking && ticks < 20) f.step(), ++ticks;
+  while (f.out.supervisor.mode == Mode::tracking && ticks < 20) {
+    f.step();
+    ++ticks;
+  }
   EXPECT_EQ(ticks, 5);
   EXPECT_EQ(f.out.supervisor.reason, Reason::odometry_lost);
 }
@@ -138,7 +141,10 @@ TEST(TickReactions, AVioThatFliesAwayIsNotTakenForAResetOfTheController) {
   const Vec3 local = f.out.command_local.p_W;
   double off = 0, v = 0;
   std::optional<Reason> held;
-  f.spoil = [&](auto& s) { s.state.p_W.y() += off, s.state.v_W.y() += v; };
+  f.spoil = [&](auto& s) {
+    s.state.p_W.y() += off;
+    s.state.v_W.y() += v;
+  };
   for (int n = 0; f.out.supervisor.mode != Mode::land && n < 60; ++n) {
     const double before = v;
     v = std::min(v + 0.4, 1.4);

@@ -82,7 +82,8 @@ TEST(Tracker, JudgesAgainstTheSetOfTheTick) {
 // Errors leave the sets of a stated risk as it promises.
 TEST(Tracker, JudgesByTheWorstCaseWhatWasPlannedByARisk) {
   auto s = segment(4);
-  s.worst = 3, s.worst_at_rest = 2;
+  s.worst = 3;
+  s.worst_at_rest = 2;
   Tracker tracker(start(), first_set());
   ASSERT_TRUE(tracker.accept(s, kAtStart));
   EXPECT_TRUE(tracker.judge(Vec3(0.29, 0, 1)).inside);

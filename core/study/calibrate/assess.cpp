@@ -37,10 +37,14 @@ std::vector<Bin> bins(std::span<const double> edges) {
 void count(std::vector<Bin>& all, double at, const Vec3& covered) {
   for (auto& bin : all) {
     if (at < bin.low || at >= bin.high) continue;
-    bin.windows += 1, bin.coverage += covered;
+    bin.windows += 1;
+    bin.coverage += covered;
     return;
   }
-  if (!all.empty()) all.back().windows += 1, all.back().coverage += covered;  // infinite: no wall, no floor
+  if (!all.empty()) {
+    all.back().windows += 1;
+    all.back().coverage += covered;
+  }  // infinite: no wall, no floor
 }
 
 }  // namespace
@@ -73,13 +77,16 @@ Assessment assess(const Data& data, std::span<const Vec3> ln_bound, double q) {
         const double r = v[axis] - ln_bound[n][axis];
         covered[axis] = r <= 0 ? 1 : 0;
         a.loss += pinball(r, q);
-        ratio[i].push_back(-r), all[i].push_back(v[axis]);
+        ratio[i].push_back(-r);
+        all[i].push_back(v[axis]);
         by_height[i][static_cast<int>(std::min(h.features.height, kCalibrationRules.highest.value) /
                                       kCalibrationRules.height_step)]
             .push_back(v[axis]);
       }
-      a.windows += 1, a.coverage += covered;
-      a.flight_coverage[h.flight] += covered, a.flight_windows[h.flight] += 1;
+      a.windows += 1;
+      a.coverage += covered;
+      a.flight_coverage[h.flight] += covered;
+      a.flight_windows[h.flight] += 1;
       count(a.by_wall_distance, h.features.wall_distance, covered);
       count(a.by_height, h.features.height, covered);
     }

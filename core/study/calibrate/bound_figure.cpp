@@ -20,8 +20,10 @@ Extent extent(const Data& data, std::size_t place) {
   Extent e;
   for (const auto& h : data.hovers) {
     if (data.place[h.flight] != place) continue;
-    e.low = e.low.cwiseMin(h.p_W), e.high = e.high.cwiseMax(h.p_W);
-    e.x += h.p_W.x(), e.hovers += 1;
+    e.low = e.low.cwiseMin(h.p_W);
+    e.high = e.high.cwiseMax(h.p_W);
+    e.x += h.p_W.x();
+    e.hovers += 1;
   }
   e.x /= std::max(1.0, e.hovers);
   return e;

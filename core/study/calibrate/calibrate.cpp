@@ -147,12 +147,14 @@ std::vector<Hover> hovers_of(const FlightWindows& flight, std::size_t number, co
     if ((w.variance.array() <= 0).any()) continue;
     if (segment.empty() || segment.back() != w.segment || (w.p_W - at.back()).norm() > kCalibrationRules.same_place) {
       hovers.push_back({number, Vec3::Zero(), {}, {}, Vec3::Zero(), Vec3::Zero(), 0});
-      at.push_back(Vec3::Zero()), segment.push_back(w.segment);
+      at.push_back(Vec3::Zero());
+      segment.push_back(w.segment);
     }
     Hover& h = hovers.back();
     const double n = static_cast<double>(h.ln_variance.size() + 1);
     const auto include = [n](Vec3& mean, const Vec3& x) { mean += (x - mean) / n; };
-    include(at.back(), w.p_W), include(h.push, w.mean);
+    include(at.back(), w.p_W);
+    include(h.push, w.mean);
     const double tau_w = flight.tau_w(w);
     h.tau_w += (tau_w - h.tau_w) / n;
     include(h.push_noise, 2 * tau_w * w.variance);
@@ -160,7 +162,8 @@ std::vector<Hover> hovers_of(const FlightWindows& flight, std::size_t number, co
   }
   const auto found = features(grid, gates, at);
   for (std::size_t i = 0; i < hovers.size(); ++i) {
-    hovers[i].p_W = at[i], hovers[i].features = found[i];
+    hovers[i].p_W = at[i];
+    hovers[i].features = found[i];
     hovers[i].push_noise /=
         kCalibrationRules.same_window * static_cast<double>(hovers[i].ln_variance.size());  // over its time
   }

@@ -15,13 +15,20 @@ constexpr double kLeastDecay = kCalibrationRules.least_decay, kDecayRatio = kCal
 /// Pairs a value with its place in a model, both ways.
 template <typename M, typename Visit>
 void for_each_place(M& m, Visit visit) {
-  visit(kBaseH, m.base.horizontal), visit(kBaseZ, m.base.vertical);
-  visit(kGroundLambdaH, m.ground.lambda.horizontal), visit(kGroundLambdaZ, m.ground.lambda.vertical);
-  visit(kGroundK1H, m.ground.k1.horizontal), visit(kGroundK1Z, m.ground.k1.vertical);
-  visit(kCornerN, m.corner.lambda.normal), visit(kCornerT, m.corner.lambda.tangential);
+  visit(kBaseH, m.base.horizontal);
+  visit(kBaseZ, m.base.vertical);
+  visit(kGroundLambdaH, m.ground.lambda.horizontal);
+  visit(kGroundLambdaZ, m.ground.lambda.vertical);
+  visit(kGroundK1H, m.ground.k1.horizontal);
+  visit(kGroundK1Z, m.ground.k1.vertical);
+  visit(kCornerN, m.corner.lambda.normal);
+  visit(kCornerT, m.corner.lambda.tangential);
   visit(kCornerZ, m.corner.lambda.vertical);
-  visit(kWallN, m.wall.k1.normal), visit(kWallT, m.wall.k1.tangential), visit(kWallZ, m.wall.k1.vertical);
-  visit(kGroundK2, m.ground.k2), visit(kWallK2, m.wall.k2);
+  visit(kWallN, m.wall.k1.normal);
+  visit(kWallT, m.wall.k1.tangential);
+  visit(kWallZ, m.wall.k1.vertical);
+  visit(kGroundK2, m.ground.k2);
+  visit(kWallK2, m.wall.k2);
 }
 
 /// A model whose breakdown is the features for one decay: horizontal and vertical (normal and vertical) amplitudes are
@@ -29,8 +36,10 @@ void for_each_place(M& m, Visit visit) {
 Model probe(const Model& gates, double decay) {
   Model m = gates;
   m.base = {0, 0};
-  m.ground.lambda = {1, 0}, m.ground.k1 = {0, 1};
-  m.corner.lambda = {1, 0, 1}, m.wall.k1 = {1, 0, 1};
+  m.ground.lambda = {1, 0};
+  m.ground.k1 = {0, 1};
+  m.corner.lambda = {1, 0, 1};
+  m.wall.k1 = {1, 0, 1};
   m.ground.k2 = m.wall.k2 = decay;
   return m;
 }
@@ -111,10 +120,12 @@ std::vector<Features> features(const map::OccupancyGrid& grid, const Model& gate
       Features& f = all[n];
       if (k == 0) {
         f.ground_inverse = parts.ground.xx;
-        f.corner_xx = parts.corner.xx, f.corner = parts.corner.zz;
+        f.corner_xx = parts.corner.xx;
+        f.corner = parts.corner.zz;
       }
       f.ground_decay[k] = parts.ground.zz;
-      f.wall_xx[k] = parts.wall.xx, f.wall[k] = parts.wall.zz;
+      f.wall_xx[k] = parts.wall.xx;
+      f.wall[k] = parts.wall.zz;
     }
   }
   std::vector<field::Element> lateral = field::surface_elements(grid);
@@ -140,15 +151,23 @@ FeaturesAt at_decays(const Features& f, double ln_ground_k2, double ln_wall_k2) 
 std::array<double, kAmplitudes> factors(const Features& f, const FeaturesAt& d, int axis) noexcept {
   std::array<double, kAmplitudes> x{};
   if (axis == 2) {
-    x[kBaseZ] = 1, x[kGroundLambdaZ] = f.ground_inverse, x[kGroundK1Z] = d.ground_decay;
-    x[kCornerZ] = f.corner, x[kWallZ] = d.wall;
+    x[kBaseZ] = 1;
+    x[kGroundLambdaZ] = f.ground_inverse;
+    x[kGroundK1Z] = d.ground_decay;
+    x[kCornerZ] = f.corner;
+    x[kWallZ] = d.wall;
     return x;
   }
   // m mᵀ along this axis, and t tᵀ = 1 − m mᵀ in the plane.
   const double corner = axis == 0 ? f.corner_xx : f.corner - f.corner_xx;
   const double wall = axis == 0 ? d.wall_xx : d.wall - d.wall_xx;
-  x[kBaseH] = 1, x[kGroundLambdaH] = f.ground_inverse, x[kGroundK1H] = d.ground_decay;
-  x[kCornerN] = corner, x[kCornerT] = f.corner - corner, x[kWallN] = wall, x[kWallT] = d.wall - wall;
+  x[kBaseH] = 1;
+  x[kGroundLambdaH] = f.ground_inverse;
+  x[kGroundK1H] = d.ground_decay;
+  x[kCornerN] = corner;
+  x[kCornerT] = f.corner - corner;
+  x[kWallN] = wall;
+  x[kWallT] = d.wall - wall;
   return x;
 }
 

@@ -54,7 +54,8 @@ class Loss {
         double slope = 0;
         for (const auto& v : h.ln_variance) {
           const Smooth rho = smooth_pinball(v[axis] - at, q_);
-          sum += weight * rho.value, slope += rho.slope;
+          sum += weight * rho.value;
+          slope += rho.slope;
         }
         slope *= -weight / sigma;
         for (std::size_t j = 0; j < kAmplitudes; ++j) gradient[j] += slope * f[j] * scale_[j];
@@ -80,7 +81,10 @@ class Loss {
         const auto f = factors(h.features, d, axis);
         for (std::size_t j = 0; j < kAmplitudes; ++j) mean[j] += f[j] / static_cast<double>(data_.hovers.size());
       }
-      for (const auto& v : h.ln_variance) ln_variance += v.mean(), windows += 1;
+      for (const auto& v : h.ln_variance) {
+        ln_variance += v.mean();
+        windows += 1;
+      }
     }
     scale_.fill(1);
     for (std::size_t j = 0; j < kAmplitudes; ++j) {
@@ -108,7 +112,10 @@ double evaluate(const std::vector<double>& x, std::vector<double>& gradient, voi
   std::copy(x.begin(), x.end(), at.begin());
   const double value = (*call.loss)(at, slope);
   if (!gradient.empty()) std::copy(slope.begin(), slope.end(), gradient.begin());
-  if (value < call.best) call.best = value, call.best_x = at;
+  if (value < call.best) {
+    call.best = value;
+    call.best_x = at;
+  }
   return value;
 }
 
@@ -116,7 +123,8 @@ double evaluate(const std::vector<double>& x, std::vector<double>& gradient, voi
 Parameters minimised(const Loss& loss, const Parameters& x, const Free& free, double tolerance) {
   nlopt::opt solver(nlopt::LD_LBFGS, kParameters);
   std::vector<double> low(kParameters, 0.0), high(kParameters, kCalibrationRules.largest_scaled);
-  low[kBaseH] = kLeastBase / loss.scales()[kBaseH], low[kBaseZ] = kLeastBase / loss.scales()[kBaseZ];
+  low[kBaseH] = kLeastBase / loss.scales()[kBaseH];
+  low[kBaseZ] = kLeastBase / loss.scales()[kBaseZ];
   low[kGroundK2] = low[kWallK2] = std::log(kCalibrationRules.least_decay);
   high[kGroundK2] = high[kWallK2] = std::log(kLargestDecay);
   std::vector<double> at(x.begin(), x.end());
@@ -124,8 +132,10 @@ Parameters minimised(const Loss& loss, const Parameters& x, const Free& free, do
     if (!free[j]) low[j] = high[j] = at[j];
     at[j] = std::clamp(at[j], low[j], high[j]);
   }
-  solver.set_lower_bounds(low), solver.set_upper_bounds(high);
-  solver.set_ftol_rel(tolerance), solver.set_maxeval(static_cast<int>(kCalibrationRules.evaluations));
+  solver.set_lower_bounds(low);
+  solver.set_upper_bounds(high);
+  solver.set_ftol_rel(tolerance);
+  solver.set_maxeval(static_cast<int>(kCalibrationRules.evaluations));
   Call call{&loss, x, std::numeric_limits<double>::infinity()};
   std::copy(at.begin(), at.end(), call.best_x.begin());
   solver.set_min_objective(evaluate, &call);
@@ -160,9 +170,14 @@ void analyse(const Data& data, std::span<const double> weights, const Sums& r, G
     if (!used(f)) continue;
     const double m = r.first[f] / r.count[f];
     const std::size_t place = data.place[f];
-    if (place >= place_sum.size()) place_sum.resize(place + 1), place_weight.resize(place + 1);
-    place_sum[place] += weights[f] * m, place_weight[place] += weights[f];
-    within += weights[f] * (r.second[f] - r.count[f] * m * m), freedom += weights[f] * (r.count[f] - 1);
+    if (place >= place_sum.size()) {
+      place_sum.resize(place + 1);
+      place_weight.resize(place + 1);
+    }
+    place_sum[place] += weights[f] * m;
+    place_weight[place] += weights[f];
+    within += weights[f] * (r.second[f] - r.count[f] * m * m);
+    freedom += weights[f] * (r.count[f] - 1);
     total += weights[f];
     s.means[f][g] = m;
   }
@@ -176,7 +191,8 @@ void analyse(const Data& data, std::span<const double> weights, const Sums& r, G
     windows_explain += weights[f] / total * within_variance / r.count[f];
   }
   const double variance = total > places ? std::max(0.0, between / (total - places) - windows_explain) : 0;
-  s.between[g] = std::sqrt(variance), s.within[g] = std::sqrt(within_variance);
+  s.between[g] = std::sqrt(variance);
+  s.within[g] = std::sqrt(within_variance);
   for (std::size_t f = 0; f < flights; ++f) {
     if (used(f) && variance > 0) s.levels[f][g] = variance / (variance + within_variance / r.count[f]) * s.means[f][g];
   }
@@ -200,7 +216,9 @@ LevelScatter scatter(const Data& data, std::span<const double> weights, const Pa
   std::array<Sums, kGroups> sums{Sums(flights), Sums(flights)};
   for_each_residual(data, weights, parameters, [&](std::size_t flight, int axis, double r) {
     auto& g = sums[group(axis)];
-    g.first[flight] += r, g.second[flight] += r * r, g.count[flight] += 1;
+    g.first[flight] += r;
+    g.second[flight] += r * r;
+    g.count[flight] += 1;
   });
   for (const Group g : {kHorizontal, kVertical}) analyse(data, weights, sums[g], g, s);
   return s;
@@ -262,7 +280,8 @@ Fit fit(const Data& data, std::span<const double> flight_weights, const Paramete
     result.parameters = scaled(minimised(loss, scaled(result.parameters, 1), options.free, tolerance), -1);
   }
   const LevelScatter s = scatter(data, flight_weights, result.parameters);
-  result.between_sd = s.between, result.within_sd = s.within;
+  result.between_sd = s.between;
+  result.within_sd = s.within;
   for (const Group g : {kHorizontal, kVertical}) {
     const double factor = std::exp(level_shift(data, flight_weights, result.parameters, s, g, options.quantile));
     for (std::size_t j = 0; j < kAmplitudes; ++j) {

@@ -43,7 +43,9 @@ class Regression {
           flights
               .try_emplace(r.flight, FlightSums{r.day, 0, VectorXd::Zero(v.size()), MatrixXd::Zero(v.size(), v.size())})
               .first->second;
-      f.count += 1, f.sum += v, f.square += v * v.transpose();
+      f.count += 1;
+      f.sum += v;
+      f.square += v * v.transpose();
     }
     for (auto& [number, f] : flights) flights_.push_back(std::move(f));
     columns_ = flights_.front().sum.size() - 2;
@@ -72,17 +74,23 @@ class Regression {
   /// σ_e² and σ_b² of what β leaves, by moments: within flights, and of the flights' means within days.
   std::pair<double, double> components(const VectorXd& beta) const {
     VectorXd r = VectorXd::Zero(columns_ + 2);
-    r.head(columns_) = -beta, r[columns_ + 1] = 1;
+    r.head(columns_) = -beta;
+    r[columns_ + 1] = 1;
     double sse = 0, free = 0, ssb = 0, spread = 0, members = 0;
     std::map<int, Eigen::Array4d> days;  // n, Σn m, Σn m², Σn²
     for (const auto& f : flights_) {
       const double mean = r.dot(f.sum) / f.count;
-      sse += r.dot(f.square * r) - f.count * mean * mean, free += f.count - 1;
+      sse += r.dot(f.square * r) - f.count * mean * mean;
+      free += f.count - 1;
       days.try_emplace(f.day, Eigen::Array4d::Zero()).first->second +=
           Eigen::Array4d(f.count, f.count * mean, f.count * mean * mean, f.count * f.count);
       members += 1;
     }
-    for (const auto& [day, s] : days) ssb += s[2] - s[1] * s[1] / s[0], spread += s[0] - s[3] / s[0], members -= 1;
+    for (const auto& [day, s] : days) {
+      ssb += s[2] - s[1] * s[1] / s[0];
+      spread += s[0] - s[3] / s[0];
+      members -= 1;
+    }
     const double within = free > 0 ? sse / free : 1;
     return {within, spread > 0 ? std::max(0.0, (ssb - members * within) / spread) : 0};
   }
@@ -158,7 +166,8 @@ HeightEffect height_effect(const std::vector<HeightRow>& rows, double low_m, dou
   std::set<std::size_t> flights, low, high, plated, bare;
   std::set<int> days;
   for (const auto& r : rows) {
-    flights.insert(r.flight), days.insert(r.day);
+    flights.insert(r.flight);
+    days.insert(r.day);
     if (within_two(r.height, low_m)) low.insert(r.flight);
     if (within_two(r.height, high_m)) high.insert(r.flight);
     if (r.plate != Plate::not_said) (r.plate == Plate::above ? plated : bare).insert(r.flight);
@@ -168,7 +177,9 @@ HeightEffect height_effect(const std::vector<HeightRow>& rows, double low_m, dou
   const Regression law(rows, [&](auto& r) { return std::vector{returned(r.height, length_m)}; });
   const auto by_law =
       contrasts(law, {{0, returned(low_m, length_m) - returned(high_m, length_m)}, {law.plate(), 1}}, bootstraps, seed);
-  effect.low_over_high = by_law.ratios[0], effect.within = by_law.within, effect.between = by_law.between;
+  effect.low_over_high = by_law.ratios[0];
+  effect.within = by_law.within;
+  effect.between = by_law.between;
   if (!plated.empty() && !bare.empty()) effect.ceiling = by_law.ratios[1];
   if (low.empty() || high.empty()) return effect;
   std::vector<HeightRow> binned;

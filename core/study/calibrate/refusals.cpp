@@ -21,7 +21,11 @@ const std::vector<Parameter> kWallAll = {kWallN, kWallT, kWallZ, kWallK2};
 struct Range {
   double low = kFar, high = -kFar;
   std::size_t hovers = 0;
-  void include(double x) { low = std::min(low, x), high = std::max(high, x), hovers += 1; }
+  void include(double x) {
+    low = std::min(low, x);
+    high = std::max(high, x);
+    hovers += 1;
+  }
   double spread() const { return hovers > 0 ? high - low : 0; }
 };
 

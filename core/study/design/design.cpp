@@ -14,8 +14,10 @@ namespace {
 
 DesignedSet told_of(const Contest& contest) {
   DesignedSet set;
-  for (const auto& e : contest.explanations())
-    set.names.push_back(e.form->cause()), set.probability.push_back(e.probability);
+  for (const auto& e : contest.explanations()) {
+    set.names.push_back(e.form->cause());
+    set.probability.push_back(e.probability);
+  }
   set.pairs = contest.pairs();
   return set;
 }

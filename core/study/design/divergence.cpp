@@ -71,7 +71,10 @@ Contest::Contest(const Evidence& flown, const std::vector<Accepted>& accepted, s
     all_.push_back({r.form, anchored(*r.form, r.scale, flown.seen().windows), r.behind_nats, 0});
   double best = 0, sum = 0;
   for (const auto& e : all_) best = std::min(best, e.behind);
-  for (auto& e : all_) e.probability = std::exp(best - e.behind), sum += e.probability;
+  for (auto& e : all_) {
+    e.probability = std::exp(best - e.behind);
+    sum += e.probability;
+  }
   for (auto& e : all_) e.probability /= sum;
   for (std::size_t i = 0; i < all_.size(); ++i)
     for (std::size_t j = 0; j < all_.size(); ++j)
@@ -110,7 +113,9 @@ Contest::Duel Contest::duel(std::size_t truth, std::size_t rival) const {
   const Explanation &ours = all_[truth], &theirs = all_[rival];
   const Observations& seen = flown_->seen();
   Duel d{};
-  d.truth = truth, d.rival = rival, d.lead = theirs.behind - ours.behind;
+  d.truth = truth;
+  d.rival = rival;
+  d.lead = theirs.behind - ours.behind;
   const auto own = ours.form->columns(seen.windows, ours.scale),
              other = theirs.form->columns(seen.windows, theirs.scale);
   auto both = own;
@@ -119,7 +124,8 @@ Contest::Duel Contest::duel(std::size_t truth, std::size_t rival) const {
   const NormalEquations we = flown_->normal(own, nuisance), they = flown_->normal(other, nuisance);
   d.never = !we.solvable || !they.solvable || (ours.form->motors_alone && theirs.form->motors_alone);
   if (d.never) return d;
-  d.theta = we.fit(), d.gain = we.gain();
+  d.theta = we.fit();
+  d.gain = we.gain();
   d.error = lead_over(we, they).error;
   d.dynamic = dynamic(own) || dynamic(other);
   add_copies(d);

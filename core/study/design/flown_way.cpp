@@ -38,7 +38,8 @@ FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way
       commands.insert(commands.end(), turn.begin(), turn.end());
     }
     flown.commands.insert(flown.commands.end(), commands.begin(), commands.end());
-    now.p_W = goal.p_W, now.yaw = commands.back().yaw;
+    now.p_W = goal.p_W;
+    now.yaw = commands.back().yaw;
     flown.points.push_back(goal);
     if (flown.commands.size() >= most) break;
   }

@@ -24,7 +24,9 @@ log::FlightLog commanded(const std::vector<Setpoint>& commands) {
   for (std::size_t k = 0; k < commands.size(); ++k) {
     const Setpoint& c = commands[k];
     log.t_s.push_back(static_cast<double>(k) * kControlPeriod);
-    put(log, "", "_m", c.p_W), put(log, "cmd_", "_m", c.p_W), put(log, "cmd_v", "_mps", c.v_W);
+    put(log, "", "_m", c.p_W);
+    put(log, "cmd_", "_m", c.p_W);
+    put(log, "cmd_v", "_mps", c.v_W);
     put(log, "cmd_a", "_mps2", c.a_W);
   }
   return log;
@@ -37,8 +39,10 @@ void put_thrust(log::FlightLog& log, const Vec3& acceleration_W, double yaw, con
   Mat3 R_WB;
   R_WB << x, z.cross(x), z;
   const Eigen::Quaterniond q(R_WB);
-  log.columns["qw"].push_back(q.w()), log.columns["qx"].push_back(q.x());
-  log.columns["qy"].push_back(q.y()), log.columns["qz"].push_back(q.z());
+  log.columns["qw"].push_back(q.w());
+  log.columns["qx"].push_back(q.x());
+  log.columns["qy"].push_back(q.y());
+  log.columns["qz"].push_back(q.z());
   const double share = thrust.norm() * vehicle.body.mass / vehicle.propulsion.max_thrust;
   log.columns["thrust"].push_back(thrust_command(vehicle, share));
 }
@@ -50,7 +54,9 @@ std::pair<double, double> typical(const Observations& flown, std::size_t channel
   for (std::size_t i = 0; i < flown.windows.size(); ++i) {
     const double w = flown.weight[channel][i];
     if (!(w > 0)) continue;
-    sum += w * flown.y[channel][i], weight += w, weights.push_back(w);
+    sum += w * flown.y[channel][i];
+    weight += w;
+    weights.push_back(w);
   }
   if (weights.empty()) return {0, 0};
   return {sum / weight, quantile(std::move(weights), 0.5)};
@@ -83,7 +89,8 @@ Observations Imagination::windows(const std::vector<Setpoint>& commands, bool us
   for (std::size_t k = 0; k < nominal.size(); ++k) {
     const double sign = k % 2 == 0 ? 1 : -1;
     put(log, "", "_m", nominal.p_nominal[k] + sign * kDesignRules.design_jitter * Vec3::Ones());
-    put(log, "v", "_mps", nominal.v_nominal[k]), put(log, "a", "_mps2", nominal.a_nominal[k]);
+    put(log, "v", "_mps", nominal.v_nominal[k]);
+    put(log, "a", "_mps2", nominal.a_nominal[k]);
     if (attitude) put_thrust(log, nominal.a_nominal[k], commands[k].yaw, vehicle_);
     if (flown_->has(Source::battery))
       log.columns["battery_v"].push_back(*first_voltage(used_battery) + volts.rate * nominal.t[k]);

@@ -24,7 +24,10 @@ class Room {
       voxels_.push_back(v);
       const double way = (world.grid.center(v) - start_W).norm();
       const double room = world.distance.at(v) - kDesignRules.design_nearer * way;  // the nearest of the roomiest
-      if (room > most) most = room, open_ = v;
+      if (room > most) {
+        most = room;
+        open_ = v;
+      }
     }
   }
   bool empty() const { return voxels_.empty(); }
@@ -97,7 +100,12 @@ class List {
  public:
   explicit List(const Room& room) : room_(room), open_(room.open()) {}
   std::vector<Way> all() {
-    stand(), heights(), lines(), turns(), ceilings(), walls();
+    stand();
+    heights();
+    lines();
+    turns();
+    ceilings();
+    walls();
     return std::move(ways_);
   }
 

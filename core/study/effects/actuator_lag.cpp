@@ -60,7 +60,8 @@ Effect actuator_lag() {
           .remedy = of_either,
           .manoeuvres = {{"thrust pulses: climb and sink with 2 m/s² in turn",
                           [](WindowRow& w, double) {
-                            w.delay_gain = {-60, 0}, w.slope_gain = {0, 14};
+                            w.delay_gain = {-60, 0};
+                            w.slope_gain = {0, 14};
                           }},
                          {"hover in gusts, attitude logged", [](WindowRow& w, double) { w.tilt_gain = 10; }}}};
 }

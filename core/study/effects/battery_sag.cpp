@@ -11,7 +11,10 @@ namespace {
 /// The highest and the mean voltage flown.
 std::vector<double> voltages(const Windows& ws) {
   double highest = 0, mean = kEffectRules.no_sag;
-  for (const auto& w : ws) highest = std::max(highest, w.voltage), mean += w.voltage / static_cast<double>(ws.size());
+  for (const auto& w : ws) {
+    highest = std::max(highest, w.voltage);
+    mean += w.voltage / static_cast<double>(ws.size());
+  }
   return {highest, mean};
 }
 

@@ -35,7 +35,8 @@ double of_gusts(const WindowRow& w, const Scale& scale, F share) {
   for (std::size_t k = 0; k < kPoints; ++k) {
     at[k] = share(std::sqrt(w.speeds[k] * w.speeds[k] + sway));
     weight[k] = w.shares[k] * left_of_trend(w, (static_cast<double>(k) + 0.5) / kPoints - 0.5);
-    total += weight[k], mean += weight[k] * at[k];
+    total += weight[k];
+    mean += weight[k] * at[k];
   }
   if (!(total > 0)) return 0;
   mean /= total;
@@ -95,7 +96,8 @@ Effect forward_speed() {
                      .simulate = simulates(Law::ln_variance_with_speed)}},
           .axis = {"speed, m/s", false, [](auto& w) { return w.speed; }},
           .manoeuvres = {{"fly fast and slow on one line at one height", [](WindowRow& w, double s) {
-                            w.speed = 1.5 * s, w.speeds.fill(w.speed);
+                            w.speed = 1.5 * s;
+                            w.speeds.fill(w.speed);
                             w.v_W = w.speed * (std::fmod(8 * s, 2.0) < 1 ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX()));
                           }}}};
 }

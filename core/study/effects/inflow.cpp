@@ -24,7 +24,8 @@ Effect inflow() {
           .axis = {"climb, m/s", false, [](auto& w) { return w.v_W.z(); }},
           .manoeuvres = {
               {"climb and sink at one speed through the same heights, away from walls", [](WindowRow& w, double s) {
-                 w.speed = 0.7, w.speeds.fill(w.speed);
+                 w.speed = 0.7;
+                 w.speeds.fill(w.speed);
                  w.v_W = Vec3(0, 0, std::fmod(8 * s, 2.0) < 1 ? 0.7 : -0.7);
                }}}};
 }

@@ -73,7 +73,12 @@ SimulationTerm rotor_lines(const Observations& seen) {
     double power = 0, n = 0;
     for (const auto& w : seen.windows) {
       const auto& line = w.lines[rotor];
-      if (line) power += line->amplitude2, floor += line->floor2, n += 1, of_floor += 1;
+      if (line) {
+        power += line->amplitude2;
+        floor += line->floor2;
+        n += 1;
+        of_floor += 1;
+      }
     }
     if (n > 0) term.value[rotor] = std::sqrt(std::max(0.0, power / n));
   }
@@ -83,7 +88,13 @@ SimulationTerm rotor_lines(const Observations& seen) {
 
 Course mean_course(const Observations& seen, double WindowRow::*quantity) {
   double n = 0, t = 0, x = 0, tt = 0, tx = 0;
-  for (const auto& w : seen.windows) n += 1, t += w.t, x += w.*quantity, tt += w.t * w.t, tx += w.t * (w.*quantity);
+  for (const auto& w : seen.windows) {
+    n += 1;
+    t += w.t;
+    x += w.*quantity;
+    tt += w.t * w.t;
+    tx += w.t * (w.*quantity);
+  }
   const double spread = n * tt - t * t;
   const double rate = spread > 0 ? (n * tx - t * x) / spread : 0;
   return {n > 0 ? (x - rate * t) / n : 0, rate};

@@ -25,8 +25,10 @@ std::vector<DesignColumn> facing_rotors(const Windows& ws, const Scale& pairing)
 std::vector<SimulationTerm> needed_of_rotors(const FittedForm& fitted, const Observations&) {
   const auto& pair = kFacing[static_cast<std::size_t>(fitted.scale.value)];
   SimulationTerm term{SimulationTerm::Kind::rotor_needs, std::vector<double>(4, 0)};
-  term.value[pair[0]] = fitted.theta[0], term.value[pair[1]] = -fitted.theta[0];
-  term.value[pair[2]] = fitted.theta[1], term.value[pair[3]] = -fitted.theta[1];
+  term.value[pair[0]] = fitted.theta[0];
+  term.value[pair[1]] = -fitted.theta[0];
+  term.value[pair[2]] = fitted.theta[1];
+  term.value[pair[3]] = -fitted.theta[1];
   return {term};
 }
 

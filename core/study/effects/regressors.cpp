@@ -70,7 +70,8 @@ Windows moved_by(const Windows& windows, const std::vector<DesignColumn>& column
     if (moved[i].held_off) continue;
     const Vec3 by = push.cwiseProduct(moved[i].give).cwiseMax(-kStrayed).cwiseMin(kStrayed);
     const auto move = [&](PlaceAround& place) {
-      place.height += by.z(), place.ceiling_gap -= by.z();
+      place.height += by.z();
+      place.ceiling_gap -= by.z();
       for (auto* walls : {&place.walls, &place.whole_walls})
         for (auto& [distance, direction] : *walls) distance -= by.dot(direction);
     };

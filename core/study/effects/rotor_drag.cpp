@@ -18,7 +18,8 @@ std::vector<DesignColumn> against(const Windows& ws, const Scale& scale, F per_s
     for (std::size_t i = 0; i < kPoints && told > 0; ++i) {
       const double level2 = w.speeds[i] * w.speeds[i] - w.climbs[i] * w.climbs[i];
       const double along = speed / told * std::sqrt(std::max(0.0, level2));
-      way += along, dragged += along * per_speed(along);
+      way += along;
+      dragged += along * per_speed(along);
     }
     return -v * (way > 0 ? dragged / way : per_speed(speed));
   });

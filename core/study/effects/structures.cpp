@@ -49,7 +49,8 @@ void add_rank(const Take& take, const Regressor& along, const std::vector<double
   Structure many = few;
   many.shape = std::to_string(kMany) + " cosines";
   for (int k = kFew + 1; k <= kMany; ++k) many.functions.push_back(cosine(pi * k, q));
-  take(std::move(few)), take(std::move(many));
+  take(std::move(few));
+  take(std::move(many));
 }
 
 void add_turns(const Take& take, const Regressor& along, const std::vector<double>& angle) {
@@ -86,7 +87,8 @@ Functions tone(double hz, const Moments& windows) {
   for (const auto& [t, duration] : windows) {
     // Its mean over the window is weaker than its value in the middle.
     const double half = pi * hz * duration, kept = half > 0 ? std::sin(half) / half : 1;
-    both[0].push_back(kept * std::cos(2 * pi * hz * t)), both[1].push_back(kept * std::sin(2 * pi * hz * t));
+    both[0].push_back(kept * std::cos(2 * pi * hz * t));
+    both[1].push_back(kept * std::sin(2 * pi * hz * t));
   }
   return both;
 }

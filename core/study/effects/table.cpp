@@ -34,7 +34,10 @@ const std::vector<Effect>& effects() {
     for (Effect& e : made)
       for (Form& f : e.forms) {
         f.effect = &e;
-        for (Form& shape : f.shapes) shape.effect = &e, shape.parameters = f.parameters;
+        for (Form& shape : f.shapes) {
+          shape.effect = &e;
+          shape.parameters = f.parameters;
+        }
       }
     return made;
   }();

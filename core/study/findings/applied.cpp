@@ -73,16 +73,25 @@ void measure_error(Applied& applied, const Observations& seen, const Moved& own,
     const auto left = [&](std::size_t i) { return seen.y[c][i] - at(others, c, i); };
     for (std::size_t i = 0; i < own[c].size() && c >= kVarX && c <= kVarZ; ++i) {
       const double w = seen.weight[c][i];
-      level_before += w * left(i), level_after += w * (left(i) - own[c][i]), weight += w;
+      level_before += w * left(i);
+      level_after += w * (left(i) - own[c][i]);
+      weight += w;
     }
-    if (weight > 0) level_before /= weight, level_after /= weight;
+    if (weight > 0) {
+      level_before /= weight;
+      level_after /= weight;
+    }
     for (std::size_t i = 0; i < own[c].size(); ++i) {
       const double w = seen.weight[c][i];
       before += w * std::pow(left(i) - level_before, 2);
-      after += w * std::pow(left(i) - own[c][i] - level_after, 2), count += w;
+      after += w * std::pow(left(i) - own[c][i] - level_after, 2);
+      count += w;
     }
   }
-  if (count > 0) applied.rmse_before = std::sqrt(before / count), applied.rmse_after = std::sqrt(after / count);
+  if (count > 0) {
+    applied.rmse_before = std::sqrt(before / count);
+    applied.rmse_after = std::sqrt(after / count);
+  }
 }
 
 void measure_coverage(Applied& applied, const Observations& seen, const Moved& own, const Moved& others) {
@@ -99,7 +108,10 @@ void measure_coverage(Applied& applied, const Observations& seen, const Moved& o
       samples += 1;
     }
   }
-  if (samples > 0) applied.coverage_before = before / samples, applied.coverage_after = after / samples;
+  if (samples > 0) {
+    applied.coverage_before = before / samples;
+    applied.coverage_after = after / samples;
+  }
 }
 
 /// Judges cause `which` among those that join the model.

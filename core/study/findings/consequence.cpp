@@ -62,7 +62,8 @@ double inside(const Observations& seen, const BoundModel& bound, const Added* ad
       const double mean = seen.y[kMeanX + axis][i] - (added ? added->mean[axis][i] : 0);
       const double sigma = w.sigma[a] * (added ? std::exp(added->ln_variance[axis][i]) : 1);
       const double limit = (axis == 2 ? bound.mean_vertical : bound.mean_horizontal) + bound.kappa * std::sqrt(sigma);
-      sum += share_within(mean, w.measured_variance[a], limit), count += 1;
+      sum += share_within(mean, w.measured_variance[a], limit);
+      count += 1;
     }
   return count > 0 ? sum / count : 0;
 }
@@ -169,8 +170,10 @@ Consequence consequence(const StudyResult& result, const Observations& seen, con
   const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, std::nullopt, parallel);
   const auto extended_world = plan::build_world(*grid, after, vehicle, reach::Method::tight, std::nullopt, parallel);
   const auto sets = sets_at(*world, places), sets_after = sets_at(*extended_world, places);
-  describe(c.before, sets), describe(c.after, sets_after);
-  c.before.safe = safe_share(sets), c.after.safe = safe_share(sets_after);
+  describe(c.before, sets);
+  describe(c.after, sets_after);
+  c.before.safe = safe_share(sets);
+  c.after.safe = safe_share(sets_after);
   std::tie(c.start_W, c.goal_W) = farthest(places, sets);
   if ((c.goal_W - c.start_W).norm() > kRules.least_route) {
     try_plan(c.before, *world, c.start_W, c.goal_W);

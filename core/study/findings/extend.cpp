@@ -88,7 +88,8 @@ std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations&
   auto effects = f.form->extend({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
   for (auto& e : effects) {
     if (entry(e.kind).of_variance || !cause.shift.refuted()) continue;
-    e.error += e.value.cwiseAbs(), e.value.setZero();  // the craft rests on its set-point: in the bound, not the centre
+    e.error += e.value.cwiseAbs();
+    e.value.setZero();  // the craft rests on its set-point: in the bound, not the centre
   }
   return effects;
 }

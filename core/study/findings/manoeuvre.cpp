@@ -15,8 +15,15 @@ Windows flown(const WindowRow& median, const Manoeuvre* manoeuvre) {
   for (std::size_t i = 0; i < kWindows; ++i) {
     WindowRow& w = windows[i];
     w.path.clear();
-    w.v_W.setZero(), w.speed = 0, w.speeds.fill(0), w.delay_gain = {}, w.slope_gain = {}, w.command_gain = {},
-                     w.lag_gain = {}, w.mean_gain = {}, w.tilt_gain = 0;
+    w.v_W.setZero();
+    w.speed = 0;
+    w.speeds.fill(0);
+    w.delay_gain = {};
+    w.slope_gain = {};
+    w.command_gain = {};
+    w.lag_gain = {};
+    w.mean_gain = {};
+    w.tilt_gain = 0;
     if (manoeuvre) manoeuvre->set(w, (static_cast<double>(i) + 0.5) / kWindows);
   }
   return windows;

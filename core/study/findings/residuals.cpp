@@ -27,7 +27,10 @@ std::optional<std::size_t> nearest(const ByTime& flight, double t) {
   std::optional<std::size_t> best;
   double distance = kRules.window_match;
   const auto look = [&](auto at) {
-    if (std::abs(at->first - t) <= distance) distance = std::abs(at->first - t), best = at->second;
+    if (std::abs(at->first - t) <= distance) {
+      distance = std::abs(at->first - t);
+      best = at->second;
+    }
   };
   if (after != flight.end()) look(after);
   if (after != flight.begin()) look(std::prev(after));
@@ -70,7 +73,10 @@ Told told_of(const Observations& measured, std::span<const Observations> simulat
       if (w.flight >= flights.size()) continue;
       const auto at = nearest(flights[w.flight], w.t);
       for (std::size_t c = 0; at && c < kChannels; ++c)
-        if (replica.weight[c][*at] > 0) sum[c][i] += replica.y[c][*at], count[c][i] += 1;
+        if (replica.weight[c][*at] > 0) {
+          sum[c][i] += replica.y[c][*at];
+          count[c][i] += 1;
+        }
     }
   }
   Told told;
@@ -88,7 +94,10 @@ std::optional<ChannelError> channel_error(const Observations& measured, const To
   for (std::size_t i = 0; i < measured.windows.size(); ++i) {
     if (!both(measured, told, c, i)) continue;
     const double w = measured.weight[c][i], r = measured.y[c][i] - *told[c][i];
-    weight += w, mean += w * r, square += w * r * r, ++windows;
+    weight += w;
+    mean += w * r;
+    square += w * r * r;
+    ++windows;
   }
   if (!(weight > 0)) return std::nullopt;
   mean /= weight;

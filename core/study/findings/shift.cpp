@@ -45,13 +45,16 @@ ShiftCheck check_shift(const Accepted& cause, const std::vector<double>& beside,
     if (w.give.isZero() || w.held_off || w.speed > kRules.hovering) continue;
     const Vec3 shift = push[i].cwiseProduct(w.give);
     for (Sums* s : {&flights[w.flight], &all}) {
-      s->product += shift.dot(w.off_W), s->predicted += shift.squaredNorm(), s->measured += w.off_W.squaredNorm();
+      s->product += shift.dot(w.off_W);
+      s->predicted += shift.squaredNorm();
+      s->measured += w.off_W.squaredNorm();
       s->n += 1;
     }
   }
   ShiftCheck check;
   if (!(all.n > 0)) return check;
-  check.predicted = std::sqrt(all.predicted / all.n), check.measured = std::sqrt(all.measured / all.n);
+  check.predicted = std::sqrt(all.predicted / all.n);
+  check.measured = std::sqrt(all.measured / all.n);
   std::vector<double> left;
   for (const Sums& s : flights)
     if (s.predicted > 0 && all.predicted - s.predicted > 0)
@@ -63,7 +66,8 @@ ShiftCheck check_shift(const Accepted& cause, const std::vector<double>& beside,
   for (const double x : left) mean += x / n;
   for (const double x : left) square += (x - mean) * (x - mean);
   const double error = student_975(n - 1) * std::sqrt((n - 1) / n * square);
-  check.low = check.slope - error, check.high = check.slope + error;
+  check.low = check.slope - error;
+  check.high = check.slope + error;
   check.tested = 2 * error < kRules.shift_interval;
   return check;
 }

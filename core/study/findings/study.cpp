@@ -45,7 +45,10 @@ void add_coverage(Gain& gain, const Observations& seen, const std::array<std::ve
       samples += 1;
     }
   }
-  if (samples > 0) gain.coverage_before = covered_before / samples, gain.coverage_after = covered_after / samples;
+  if (samples > 0) {
+    gain.coverage_before = covered_before / samples;
+    gain.coverage_after = covered_after / samples;
+  }
 }
 
 /// `total`: of all accepted causes; `own`: of this one. Residuals y − (total − own) before, y − total after.
@@ -64,7 +67,8 @@ Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::si
   for (const double g : per_flight) gain.held_out_nats += g;
   for (const double g : per_flight) square += std::pow(g - gain.held_out_nats / n, 2);
   const double error = student_975(n - 1) * std::sqrt(square * n / (n - 1));
-  gain.low_nats = gain.held_out_nats - error, gain.high_nats = gain.held_out_nats + error;
+  gain.low_nats = gain.held_out_nats - error;
+  gain.high_nats = gain.held_out_nats + error;
 
   double before = 0, after = 0, count = 0;
   std::array<std::vector<double>, kChannels> moved;
@@ -75,17 +79,26 @@ Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::si
     double offset_before = 0, offset_after = 0, weight = 0;
     for (std::size_t i = 0; i < x.size() && !cause.form->constant && c <= kVarZ; ++i) {
       const double w = seen.weight[c][i];
-      offset_before += w * seen.y[c][i], offset_after += w * (seen.y[c][i] - x[i]), weight += w;
+      offset_before += w * seen.y[c][i];
+      offset_after += w * (seen.y[c][i] - x[i]);
+      weight += w;
     }
-    if (weight > 0) offset_before /= weight, offset_after /= weight;
+    if (weight > 0) {
+      offset_before /= weight;
+      offset_after /= weight;
+    }
     for (std::size_t i = 0; i < x.size(); ++i) {
       const double w = seen.weight[c][i];
       before += w * std::pow(seen.y[c][i] - offset_before, 2);
-      after += w * std::pow(seen.y[c][i] - offset_after - x[i], 2), count += w;
+      after += w * std::pow(seen.y[c][i] - offset_after - x[i], 2);
+      count += w;
     }
     moved[c] = x;
   }
-  if (count > 0) gain.rmse_before = std::sqrt(before / count), gain.rmse_after = std::sqrt(after / count);
+  if (count > 0) {
+    gain.rmse_before = std::sqrt(before / count);
+    gain.rmse_after = std::sqrt(after / count);
+  }
   add_coverage(gain, seen, moved);
   return gain;
 }
@@ -173,8 +186,10 @@ double asked_along(const std::vector<double>& x, const Observations& seen) {
     const double n = static_cast<double>(seen.first[f + 1] - seen.first[f]);
     double mean = 0;
     for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i) mean += x[i] / n;
-    for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i)
-      product += (x[i] - mean) * seen.windows[i].thrust_acc, square += (x[i] - mean) * (x[i] - mean);
+    for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i) {
+      product += (x[i] - mean) * seen.windows[i].thrust_acc;
+      square += (x[i] - mean) * (x[i] - mean);
+    }
   }
   return square > 0 ? product / square : 0;
 }
@@ -227,7 +242,8 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   const WholeSearch whole = search_all(std::move(settled), options.search);
   const CauseSearchResult& found = whole.found;
   result.threshold = found.threshold;
-  result.unknown = found.unknown, result.refused = found.refused;
+  result.unknown = found.unknown;
+  result.refused = found.refused;
   Evidence evidence(whole.rest);
   evidence.whiten(columns_of(found.accepted, whole.rest));
   name_causes(result, evidence, found.accepted);

@@ -64,7 +64,10 @@ bool varies(const Regressor& along, const Observations& seen) {
   double low = HUGE_VAL, high = -HUGE_VAL;
   for (const auto& w : seen.windows) {
     const double x = along.value(w);
-    if (std::isfinite(x)) low = std::min(low, x), high = std::max(high, x);
+    if (std::isfinite(x)) {
+      low = std::min(low, x);
+      high = std::max(high, x);
+    }
   }
   return high - low > std::sqrt(std::numeric_limits<double>::epsilon()) * (std::abs(low) + 1);
 }
@@ -109,7 +112,9 @@ tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, co
     Point mean{0, 0, 0};
     for (std::size_t i = a; i < b; ++i) {
       const double n = static_cast<double>(b - a);
-      mean.x += points[i].x / n, mean.before += points[i].before / n, mean.after += points[i].after / n;
+      mean.x += points[i].x / n;
+      mean.before += points[i].before / n;
+      mean.after += points[i].after / n;
     }
     lines << mean.x << ' ' << mean.before << ' ' << mean.after << '\n';
   }

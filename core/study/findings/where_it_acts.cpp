@@ -23,11 +23,14 @@ void measure_errors(Gain& gain, const Accepted& cause, const Observations& befor
   for (const auto& [channel, x, aside] : cause.columns.front().parts)
     for (std::size_t i = 0; i < x.size(); ++i) {
       const double w = x[i] != 0 ? before.weight[channel][i] : 0;
-      square_before += w * std::pow(before.y[channel][i], 2), square_after += w * std::pow(after.y[channel][i], 2);
+      square_before += w * std::pow(before.y[channel][i], 2);
+      square_after += w * std::pow(after.y[channel][i], 2);
       weight += w;
     }
-  if (weight > 0)
-    gain.rmse_before = std::sqrt(square_before / weight), gain.rmse_after = std::sqrt(square_after / weight);
+  if (weight > 0) {
+    gain.rmse_before = std::sqrt(square_before / weight);
+    gain.rmse_after = std::sqrt(square_after / weight);
+  }
 }
 
 }  // namespace
@@ -37,7 +40,8 @@ NamedCause named(const InSomeFlights& cause, const Evidence& rest) {
   told.applied.refused = "it acts in some flights only: mend it, or study those flights by themselves";
   const auto before = with(cause.found, rest.seen());
   measure_errors(told.gain, cause.found, before, rest.seen());
-  told.gain.coverage_before = coverage(before), told.gain.coverage_after = coverage(rest.seen());
+  told.gain.coverage_before = coverage(before);
+  told.gain.coverage_after = coverage(rest.seen());
   NormalEquations normal = rest.normal(cause.found.columns, {});
   if (!normal.solvable) return told;  // one flight alone shows it
   for (std::size_t f = 0; f < normal.b.size(); ++f) normal.b[f] += normal.A[f] * cause.found.theta;
@@ -46,7 +50,9 @@ NamedCause named(const InSomeFlights& cause, const Evidence& rest) {
   double square = 0;
   for (const double g : nats) square += std::pow(g - sum / n, 2);
   const double error = student_975(n - 1) * std::sqrt(square * n / (n - 1));
-  told.gain.held_out_nats = sum, told.gain.low_nats = sum - error, told.gain.high_nats = sum + error;
+  told.gain.held_out_nats = sum;
+  told.gain.low_nats = sum - error;
+  told.gain.high_nats = sum + error;
   return told;
 }
 

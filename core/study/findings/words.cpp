@@ -45,7 +45,10 @@ std::string extrapolated(const Accepted& cause, const Observations& seen) {
   double least = HUGE_VAL, most = -HUGE_VAL;
   for (const auto& w : seen.windows) {
     const double flown = reference->flown(w);
-    if (std::isfinite(flown)) least = std::min(least, flown), most = std::max(most, flown);
+    if (std::isfinite(flown)) {
+      least = std::min(least, flown);
+      most = std::max(most, flown);
+    }
   }
   const double at = reference->value;
   if (at * kRules.beyond_flown >= least && at <= most * kRules.beyond_flown) return "";

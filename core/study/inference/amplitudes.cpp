@@ -19,15 +19,20 @@ Amplitudes::Amplitudes(const Evidence& evidence, const Form& form, const Scale& 
     bool any = false;
     for (std::size_t k = 0; k < turned.size(); ++k)
       for (const auto& part : turned[k].parts)
-        if (part.channel == channel) moved[k] = &part.x, any = true;
+        if (part.channel == channel) {
+          moved[k] = &part.x;
+          any = true;
+        }
     for (std::size_t i = 0; i < windows.size() && any; ++i) {
       const double w = evidence.weight(channel, i) / evidence.scatter(channel).within;
       if (!(w > 0)) continue;
       for (std::size_t k = 0; k < turned.size(); ++k) x[static_cast<Eigen::Index>(k)] = moved[k] ? (*moved[k])[i] : 0.0;
       SmallMatrix own_A = A(i);
       SmallVector own_b = b(i);
-      own_A += w * x * x.transpose(), own_b += w * y[i] * x;
-      A_.col(static_cast<Eigen::Index>(i)) = own_A.reshaped(), b_.col(static_cast<Eigen::Index>(i)) = own_b;
+      own_A += w * x * x.transpose();
+      own_b += w * y[i] * x;
+      A_.col(static_cast<Eigen::Index>(i)) = own_A.reshaped();
+      b_.col(static_cast<Eigen::Index>(i)) = own_b;
     }
   }
 }

@@ -22,8 +22,10 @@ std::optional<double> between_by_moments(const std::vector<Unit>& members, doubl
     groups.try_emplace(group, Eigen::Array4d::Zero()).first->second += Eigen::Array4d(w, w * m, w * m * m, w * w);
   if (groups.size() == members.size()) return std::nullopt;
   double square = 0, spread = 0;
-  for (const auto& [group, sum] : groups)
-    square += sum[2] - sum[1] * sum[1] / sum[0], spread += sum[0] - sum[3] / sum[0];
+  for (const auto& [group, sum] : groups) {
+    square += sum[2] - sum[1] * sum[1] / sum[0];
+    spread += sum[0] - sum[3] / sum[0];
+  }
   return (square - static_cast<double>(members.size() - groups.size()) * s2) / spread;
 }
 
@@ -37,10 +39,14 @@ void Evidence::anova(Channel c, const std::vector<double>& r) {
       double weight = 0, sum = 0, square = 0, count = 0;
       for (const std::size_t end = flight_end_[i]; i < end; ++i) {
         const double w = weight_[c][i];
-        weight += w, sum += w * r[i], square += w * r[i] * r[i], count += w > 0 ? 1 : 0;
+        weight += w;
+        sum += w * r[i];
+        square += w * r[i] * r[i];
+        count += w > 0 ? 1 : 0;
       }
       if (count == 0) continue;
-      sse += square - sum * sum / weight, n += count;
+      sse += square - sum * sum / weight;
+      n += count;
       flights.push_back({f, weight, sum / weight});
     }
   }
@@ -59,14 +65,17 @@ void Evidence::anova(Channel c, const std::vector<double>& r) {
     const double w = 1 / (within_[c] / f.weight + between_[c]);
     if (units.empty() || units.back().group != f.group) units.push_back({f.group, 0, 0});
     auto& unit = units.back();
-    unit.mean += w / (unit.weight + w) * (f.mean - unit.mean), unit.weight += w;
+    unit.mean += w / (unit.weight + w) * (f.mean - unit.mean);
+    unit.weight += w;
   }
   for (auto& unit : units) unit.group = 0;
   const double across = between_by_moments(units, inside ? 1 : within_[c]).value_or(0);
   if (inside)
     unit_[c] = std::max(0.0, across);
-  else
-    between_[c] = std::max(built * built, across), unit_[c] = 0;
+  else {
+    between_[c] = std::max(built * built, across);
+    unit_[c] = 0;
+  }
 }
 
 }  // namespace backwash::study

@@ -24,9 +24,12 @@ Observations slice(const Observations& seen, std::size_t unit) {
   const std::size_t first = seen.units.first[unit], end = seen.units.first[unit + 1];
   const auto at = [](auto& of, std::size_t k) { return of.begin() + static_cast<std::ptrdiff_t>(k); };
   Observations one;
-  one.flights = seen.flights, one.row_period = seen.row_period, one.missing = seen.missing;
+  one.flights = seen.flights;
+  one.row_period = seen.row_period;
+  one.missing = seen.missing;
   one.windows.assign(at(seen.windows, first), at(seen.windows, end));
-  one.first = {0, end - first}, one.units.first = one.first;
+  one.first = {0, end - first};
+  one.units.first = one.first;
   for (std::size_t c = 0; c < kChannels; ++c) {
     one.y[c].assign(at(seen.y[c], first), at(seen.y[c], end));
     one.weight[c].assign(at(seen.weight[c], first), at(seen.weight[c], end));
@@ -40,7 +43,10 @@ Observations before(const Observations& seen, std::size_t units) {
   const std::size_t end = seen.units.first[units];
   some.windows.resize(end);
   some.units.first.resize(units + 1);
-  for (std::size_t c = 0; c < kChannels; ++c) some.y[c].resize(end), some.weight[c].resize(end);
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    some.y[c].resize(end);
+    some.weight[c].resize(end);
+  }
   return some;
 }
 
@@ -62,8 +68,10 @@ SmallVector moved_into(double floor, const SmallVector& theta, const SmallMatrix
     const SmallVector at = whole.ldlt().solve(SmallVector(information * theta));
     if (at.dot(size * at) > floor * floor)
       low = middle;
-    else
-      high = middle, inside = at;
+    else {
+      high = middle;
+      inside = at;
+    }
   }
   return theta - inside;
 }
@@ -76,14 +84,18 @@ void FlightScores::add(const SmallMatrix& A, const SmallVector& b) {
   if (!(most > 0)) return;
   if (empty()) {
     if (eigen.eigenvalues().minCoeff() < kRules.spanned * most) return;  // Λ must know every parameter
-    prior_ = kRules.prior_flights * A, M_ = SmallMatrix::Zero(A.rows(), A.rows()), S_ = SmallVector::Zero(A.rows());
+    prior_ = kRules.prior_flights * A;
+    M_ = SmallMatrix::Zero(A.rows(), A.rows());
+    S_ = SmallVector::Zero(A.rows());
   }
   for (Eigen::Index k = 0; k < A.rows(); ++k) {
     const double value = eigen.eigenvalues()[k];
     if (value < kRules.ridge * most) continue;
-    Q_ += std::pow(eigen.eigenvectors().col(k).dot(b), 2) / value, dims_ += 1;
+    Q_ += std::pow(eigen.eigenvectors().col(k).dot(b), 2) / value;
+    dims_ += 1;
   }
-  M_ += A, S_ += b;
+  M_ += A;
+  S_ += b;
 }
 
 SmallVector FlightScores::fit() const { return M_.ldlt().solve(S_); }

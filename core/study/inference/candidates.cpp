@@ -19,7 +19,8 @@ bool fitted(SearchCandidate& c, const Evidence& evidence, const std::vector<Desi
   if (c.columns.size() > static_cast<std::size_t>(kMostColumns)) return false;
   c.normal = evidence.normal(c.columns, nuisance);
   if (!c.normal.solvable) return false;
-  c.gain = c.normal.gain(), c.fit = c.normal.fit();
+  c.gain = c.normal.gain();
+  c.fit = c.normal.fit();
   c.size = evidence.size(c.columns);
   return true;
 }
@@ -74,7 +75,10 @@ void each_named(const Evidence& evidence, const std::vector<DesignColumn>& accep
     if (why_not_tested(*form, evidence.seen())) continue;
     for (const Scale& scale : form->scales) {
       SearchCandidate c;
-      c.form = form, c.name = form->cause(), c.scale = scale, c.number = number++;
+      c.form = form;
+      c.name = form->cause();
+      c.scale = scale;
+      c.number = number++;
       if (fit_form(c, evidence, accepted)) take(std::move(c));
     }
   }
@@ -87,7 +91,9 @@ void each_structure_candidate(const Evidence& evidence, const std::vector<Design
   each_structure(seen, [&](Structure&& structure) {
     for (const auto& [name, channels] : channel_groups()) {
       SearchCandidate c;
-      c.name = structure.along, c.columns = columns_in(channels, structure.functions), c.number = number++;
+      c.name = structure.along;
+      c.columns = columns_in(channels, structure.functions);
+      c.number = number++;
       c.floor = channels.front() == kVarX ? kRules.structure_floor_ln : kRules.structure_floor_mean;
       if (!fitted(c, evidence, beside(c.columns, accepted, seen))) continue;
       c.structure = {structure.along, structure.shape, structure.hz, {}, structure.further};
@@ -97,7 +103,8 @@ void each_structure_candidate(const Evidence& evidence, const std::vector<Design
 }
 
 SearchCandidate outline(SearchCandidate whole) {
-  whole.columns = {}, whole.normal = {};
+  whole.columns = {};
+  whole.normal = {};
   return whole;
 }
 
@@ -133,7 +140,8 @@ SearchCandidate with_harmonics(SearchCandidate found, const Evidence& evidence,
     if (!fitted(longer, evidence, beside(longer.columns, accepted, evidence.seen())) ||
         longer.gain < found.gain + kRules.harmonic_nats)
       continue;
-    found = std::move(longer), ++added;
+    found = std::move(longer);
+    ++added;
   }
   if (added > 0) found.structure.shape += " and " + std::to_string(added) + " more";
   return found;
@@ -166,7 +174,10 @@ Eigen::MatrixXd NullMaxima::sums(const NormalEquations& normal) const {
       for (std::size_t k = 0, end = 1; k < kTogether; ++k, end *= 2) {
         const std::size_t f = kTogether * g + k;
         const double b = f < normal.b.size() ? normal.b[f][row] : 0;
-        for (std::size_t s = 0; s < end; ++s) of_signs[end + s] = of_signs[s] + b, of_signs[s] -= b;
+        for (std::size_t s = 0; s < end; ++s) {
+          of_signs[end + s] = of_signs[s] + b;
+          of_signs[s] -= b;
+        }
       }
       for (std::size_t d = 0; d < draws_.size(); ++d) sums(row, static_cast<Eigen::Index>(d)) += of_signs[signs_[g][d]];
     }

@@ -244,13 +244,16 @@ std::vector<Dependence> remaining_dependence(const Evidence& evidence, const std
       const MatrixXd phi = centred(kernel_features(points_of(along, seen.windows, rows)), rows.first);
       if (!(phi.squaredNorm() > kRules.constant_regressor)) continue;  // constant within every flight
       const auto test = turn_test(phi, psi, rows.first, draws, static_cast<int>(kRules.enough_turns), seed);
-      all.push_back({along.name, name, test.hsic, test.p, 1, false}), p.push_back(test.p);
+      all.push_back({along.name, name, test.hsic, test.p, 1, false});
+      p.push_back(test.p);
       twice.push_back(test.p <= level && in_both_halves(phi, psi, rows.first, seed) ? 1 : 0);
     }
   }
   const auto corrected = holm(p);
-  for (std::size_t k = 0; k < all.size(); ++k)
-    all[k].p_holm = corrected[k], all[k].found = corrected[k] <= level && twice[k];
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    all[k].p_holm = corrected[k];
+    all[k].found = corrected[k] <= level && twice[k];
+  }
   std::stable_sort(all.begin(), all.end(), [](auto& a, auto& b) {
     return std::tuple(!a.found, a.p_holm, a.p) < std::tuple(!b.found, b.p_holm, b.p);
   });

@@ -64,7 +64,8 @@ std::vector<double> polished(const std::vector<double>& start, double step, cons
                              const std::vector<double>& high, Objective objective) {
   nlopt::opt solver(nlopt::LN_NELDERMEAD, static_cast<unsigned>(start.size()));
   solver.set_max_objective(evaluate, &objective);
-  solver.set_lower_bounds(low), solver.set_upper_bounds(high);
+  solver.set_lower_bounds(low);
+  solver.set_upper_bounds(high);
   solver.set_initial_step(step);
   solver.set_xtol_abs(step / kRules.polish_divisor);
   solver.set_maxeval(static_cast<int>(kRules.polish_evaluations));
@@ -111,7 +112,10 @@ Eigen::VectorXd offset_error(const Evidence& evidence, const std::vector<DesignC
     Eigen::Matrix2d A = kRules.ridge * Eigen::Matrix2d::Identity();
     Eigen::Vector2d b = Eigen::Vector2d::Zero();
     for (std::size_t f = 0; f < n.b.size(); ++f)
-      if (f != out) A += n.A[f].topLeftCorner(2, 2), b += n.b[f].head(2) - n.A[f].col(2).head(2);
+      if (f != out) {
+        A += n.A[f].topLeftCorner(2, 2);
+        b += n.b[f].head(2) - n.A[f].col(2).head(2);
+      }
     left.col(static_cast<Eigen::Index>(out)) = A.ldlt().solve(b);
   }
   return jackknife(left);
@@ -273,7 +277,9 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<DesignC
   if (form.by_size) family.follow_size();
   if (family.own() == 0) return;
   const FamilyMember best = family.best_own();
-  cause.scale = best.scale, cause.theta = best.theta, cause.gain = best.normal.gain();
+  cause.scale = best.scale;
+  cause.theta = best.theta;
+  cause.gain = best.normal.gain();
   cause.columns = form.columns(family.windows, cause.scale);
   cause.parameters = family.parameters(cause.columns);
   if (family.own() > 1) {

@@ -93,7 +93,10 @@ SmallMatrix Evidence::size(const std::vector<DesignColumn>& columns) const {
     bool moved = false;
     for (std::size_t k = 0; k < columns.size(); ++k)
       for (const auto& part : columns[k].parts)
-        if (part.channel == c) active[k] = &part.x, moved = true;
+        if (part.channel == c) {
+          active[k] = &part.x;
+          moved = true;
+        }
     if (!moved) continue;
     for (std::size_t i = 0; i < seen_->windows.size(); ++i) {
       if (!(seen_->weight[c][i] > 0)) continue;
@@ -101,7 +104,8 @@ SmallMatrix Evidence::size(const std::vector<DesignColumn>& columns) const {
         const auto* column = active[static_cast<std::size_t>(k)];
         x[k] = column ? (*column)[i] : 0.0;
       }
-      sum += seen_->weight[c][i] * x * x.transpose(), n += seen_->weight[c][i];
+      sum += seen_->weight[c][i] * x * x.transpose();
+      n += seen_->weight[c][i];
     }
   }
   return n > 0 ? SmallMatrix(sum / n) : sum;

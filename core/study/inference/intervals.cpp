@@ -14,8 +14,9 @@ double student_975(double degrees) { return student_quantile(1 - kRules.tail, de
 Estimate averaged(const std::string& name, const std::vector<Guess>& guesses) {
   double total = 0, value = 0, low = guesses.front().value, high = low;
   for (const auto& g : guesses) {
-    total += g.weight, value += g.weight * g.value;
-    low = std::min(low, g.value - kRules.mixture_reach * g.error),
+    total += g.weight;
+    value += g.weight * g.value;
+    low = std::min(low, g.value - kRules.mixture_reach * g.error);
     high = std::max(high, g.value + kRules.mixture_reach * g.error);
   }
   value /= total;

@@ -79,9 +79,14 @@ Finding across(const Asked& asked) {
   const auto levels = two_levels(values.of, std::sqrt(values.error2 * finding.inflation));
   if (!levels) return finding;
   std::array<double, 2> sum{}, count{};
-  for (std::size_t f = 0; f < values.of.size(); ++f) sum[levels->high[f]] += values.of[f], count[levels->high[f]] += 1;
-  finding.p = levels->p, finding.spread = levels->spread;
-  finding.low = sum[0] / count[0], finding.high = sum[1] / count[1];
+  for (std::size_t f = 0; f < values.of.size(); ++f) {
+    sum[levels->high[f]] += values.of[f];
+    count[levels->high[f]] += 1;
+  }
+  finding.p = levels->p;
+  finding.spread = levels->spread;
+  finding.low = sum[0] / count[0];
+  finding.high = sum[1] / count[1];
   return finding;
 }
 
@@ -97,7 +102,8 @@ Finding within(const Asked& asked) {
     if (!step || step->t <= most) continue;
     most = step->t;
     const double before = level(course, 0, step->at).value;
-    finding.low = std::min(before, before + step->size), finding.high = std::max(before, before + step->size);
+    finding.low = std::min(before, before + step->size);
+    finding.high = std::max(before, before + step->size);
   }
   std::vector<double> off = values_of(asked).of;
   if (!(most > 0) || off.empty()) return finding;
@@ -115,8 +121,10 @@ std::optional<Difference> difference(const Amplitudes& a, const std::vector<Segm
   double count = 0;
   for (const auto& s : segments) {
     if (!a.told(s.unit)) continue;
-    mean[s.acting] += s.weight * a.theta(s.begin, s.end), count += 1;
-    weight[s.acting] += s.weight, square[s.acting] += s.weight * s.weight;
+    mean[s.acting] += s.weight * a.theta(s.begin, s.end);
+    count += 1;
+    weight[s.acting] += s.weight;
+    square[s.acting] += s.weight * s.weight;
   }
   if (!(weight[0] > 0 && weight[1] > 0 && count > 2)) return std::nullopt;
   for (const std::size_t k : {0u, 1u}) mean[k] /= weight[k];
@@ -182,7 +190,8 @@ std::optional<Located> located(Finding finding, const Observations& seen) {
     if (last && a.form().one_sided && !sound_flight(segments)) return std::nullopt;
     if (last) return Located{finding, std::move(segments), *d};
     if (!a.form().one_sided) finding.asked.direction = d->value().normalized();
-    finding.low = finding.asked.direction.dot(d->sound), finding.high = finding.asked.direction.dot(d->acting);
+    finding.low = finding.asked.direction.dot(d->sound);
+    finding.high = finding.asked.direction.dot(d->acting);
     if (!(finding.high > finding.low)) return std::nullopt;
   }
   return std::nullopt;

@@ -53,7 +53,10 @@ Lead lead_over(const NormalEquations& a, const NormalEquations& b) {
   const auto ga = a.gain_per_flight(), gb = b.gain_per_flight();
   double sum = 0, square = 0;
   const double n = static_cast<double>(ga.size());
-  for (std::size_t f = 0; f < ga.size(); ++f) sum += ga[f] - gb[f], square += (ga[f] - gb[f]) * (ga[f] - gb[f]);
+  for (std::size_t f = 0; f < ga.size(); ++f) {
+    sum += ga[f] - gb[f];
+    square += (ga[f] - gb[f]) * (ga[f] - gb[f]);
+  }
   return {sum, std::sqrt(std::max(0.0, (square - sum * sum / n) * n / (n - 1)))};
 }
 

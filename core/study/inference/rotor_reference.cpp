@@ -84,12 +84,19 @@ std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& soun
     const double half = t975 / size;
     v.each[rotor] = {std::expm1(t_d / size), std::expm1(t_d / size - half), std::expm1(t_d / size + half)};
     if (rotor > 0 && t_d <= v.t_d) continue;
-    v.rotor = rotor + 1, v.t_d = t_d, v.d = v.each[rotor].d, v.low = v.each[rotor].low, v.high = v.each[rotor].high;
+    v.rotor = rotor + 1;
+    v.t_d = t_d;
+    v.d = v.each[rotor].d;
+    v.low = v.each[rotor].low;
+    v.high = v.each[rotor].high;
     left = t.square().sum() - t_d * t_d;
   }
   const double f = f_quantile(1 - kRules.rotor_level, 2, degrees);
   const bool twisted = std::abs(t[0]) > t975, apart = t[1] * t[1] + t[2] * t[2] > 2 * f;
-  const auto told = [&v](Kind kind, std::vector<RotorState> set) { v.kind = kind, v.set = std::move(set); };
+  const auto told = [&v](Kind kind, std::vector<RotorState> set) {
+    v.kind = kind;
+    v.set = std::move(set);
+  };
   if (v.t_d > needed && !twisted)
     told(Kind::cannot_distinguish, {State::propeller_damage, State::payload});
   else if (v.t_d > needed && left <= 2 * f)

@@ -23,9 +23,10 @@ DesignColumn decorrelated(const DesignColumn& column) {
   std::array<const std::vector<double>*, 3> axis{};
   std::size_t n = 0;
   for (const auto& part : column.parts) {
-    if (is_ln_variance(part.channel))
-      axis[part.channel - kVarX] = &part.x, n = part.x.size();
-    else
+    if (is_ln_variance(part.channel)) {
+      axis[part.channel - kVarX] = &part.x;
+      n = part.x.size();
+    } else
       turned.parts.push_back(part);
   }
   if (n == 0) return turned;
@@ -72,7 +73,10 @@ Evidence::Evidence(const Observations& seen)
 
 Evidence Evidence::next(const Observations& flight) const {
   Evidence one(flight);
-  one.within_ = within_, one.between_ = between_, one.unit_ = unit_, one.tilt_ = tilt_;
+  one.within_ = within_;
+  one.between_ = between_;
+  one.unit_ = unit_;
+  one.tilt_ = tilt_;
   for (const auto& part : one.y_.parts)
     if (part.channel == kVarX) one.weigh_means(part.x);
   return one;
@@ -103,7 +107,8 @@ void Evidence::add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c,
     unit_sum.setZero();
     double unit_weight = 0;
     for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1];) {
-      outer.setZero(), sum.setZero();
+      outer.setZero();
+      sum.setZero();
       double weight = 0;
       for (const std::size_t end = flight_end_[i]; i < end; ++i) {
         const double w = weight_[c][i] / within_[c];
@@ -111,11 +116,13 @@ void Evidence::add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c,
         for (Eigen::Index k = 0; k < n; ++k) x[k] = (*active[static_cast<std::size_t>(k)].second)[i];
         for (Eigen::Index k = 0; k < n; ++k)
           for (Eigen::Index l = 0; l <= k; ++l) outer(k, l) += w * x[k] * x[l];
-        sum += w * x, weight += w;
+        sum += w * x;
+        weight += w;
       }
       const double own = 1 + between_[c] * weight;
       less(grams[f], between_[c] / own, sum);
-      unit_sum += sum / own, unit_weight += weight / own;
+      unit_sum += sum / own;
+      unit_weight += weight / own;
     }
     outer.setZero();
     if (unit_[c] > 0) less(grams[f], unit_[c] / (1 + unit_[c] * unit_weight), unit_sum);
@@ -158,7 +165,10 @@ double Evidence::trim_scatter(const DesignColumn& residual) const {
   for (const auto& g : grams) {
     const Eigen::Matrix2d G = g.topLeftCorner<2, 2>();
     if (!(G.determinant() > kRules.no_turn * G.trace() * G.trace())) continue;
-    sum += G, square += G * G, moved += g.topRightCorner<2, 1>(), flights += 1;
+    sum += G;
+    square += G * G;
+    moved += g.topRightCorner<2, 1>();
+    flights += 1;
   }
   if (flights < kRules.fewest_trimmed) return 0;
   const Eigen::Vector2d mean = sum.ldlt().solve(moved);
@@ -177,7 +187,10 @@ double Evidence::trim_scatter(const DesignColumn& residual) const {
 void Evidence::weigh_means(const std::vector<double>& ln_variance) {
   double error = 0, count = 0;
   for (const double w : weight_[kVarX])
-    if (w > 0) error += 1 / w - kWindowRules.scatter2, count += 1;
+    if (w > 0) {
+      error += 1 / w - kWindowRules.scatter2;
+      count += 1;
+    }
   if (count == 0) return;
   const double typical =
       static_cast<double>(count) / std::accumulate(weight_[kVarX].begin(), weight_[kVarX].end(), 0.0);
@@ -185,8 +198,10 @@ void Evidence::weigh_means(const std::vector<double>& ln_variance) {
   const double share = std::clamp(1 - error / count / (within_[kVarX] * typical), 0.0, 1.0);
   for (std::size_t f = 0; f < seen_->units.size(); ++f) {
     double mean = 0, weight = 0;
-    for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i)
-      mean += weight_[kVarX][i] * ln_variance[i], weight += weight_[kVarX][i];
+    for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i) {
+      mean += weight_[kVarX][i] * ln_variance[i];
+      weight += weight_[kVarX][i];
+    }
     if (weight > 0) mean /= weight;
     for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i) {
       const double own = weight_[kVarX][i] > 0 ? share * (ln_variance[i] - mean) : 0;
@@ -221,12 +236,18 @@ DesignColumn Evidence::residual(const std::vector<DesignColumn>& columns) const 
 }
 
 void Evidence::whiten(const std::vector<DesignColumn>& accepted) {
-  within_.fill(1), between_.fill(0), unit_.fill(0), tilt_ = 0;
+  within_.fill(1);
+  between_.fill(0);
+  unit_.fill(0);
+  tilt_ = 0;
   std::vector<DesignColumn> columns = offsets(accepted, *seen_);
   columns.insert(columns.end(), accepted.begin(), accepted.end());
   const DesignColumn rest = residual(columns);
   for (const auto& r : rest.parts)
-    if (r.channel == kVarX) anova(kVarX, r.x), weigh_means(r.x);
+    if (r.channel == kVarX) {
+      anova(kVarX, r.x);
+      weigh_means(r.x);
+    }
   for (const auto& r : rest.parts) anova(r.channel, r.x);
   if (!tilts_.empty()) tilt_ = trim_scatter(rest);
 }
@@ -247,10 +268,12 @@ void Evidence::take_flights_out(DesignColumn& residual) const {
       double mean = 0, weight = 0;
       for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i) {
         const double w = weight_[c][i] / within_[c];
-        mean += w * x[i], weight += w;
+        mean += w * x[i];
+        weight += w;
         if (c > kMeanY || !(w > 0)) continue;
         const Eigen::Vector4d d = design(c, i);
-        normal += w * d * d.transpose(), moved += w * x[i] * d;
+        normal += w * d * d.transpose();
+        moved += w * x[i] * d;
       }
       if (c <= kMeanY || !(weight > 0)) continue;
       for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1]; ++i) x[i] -= mean / weight;

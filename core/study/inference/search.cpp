@@ -69,7 +69,10 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
           a.columns, nuisance_of(*a.form, a.columns, columns_of(accepted, evidence.seen(), i), evidence.seen()));
       double gain = n.solvable ? n.gain() : 0;
       if (error_of_form(*a.form, a.columns, gain, accepted, evidence, i)) gain = std::min(gain, 0.0);
-      if (gain < least) least = gain, weakest = i;
+      if (gain < least) {
+        least = gain;
+        weakest = i;
+      }
     }
     if (weakest != SIZE_MAX) {
       accepted.erase(accepted.begin() + static_cast<std::ptrdiff_t>(weakest));
@@ -98,7 +101,8 @@ struct SearchStep {
       of_structures.add(c);
       structures.push_back(outline(std::move(c)));
     });
-    null_named = of_named.sorted(), null_structures = of_structures.sorted();
+    null_named = of_named.sorted();
+    null_structures = of_structures.sorted();
     threshold = least_gain(null_named, named_share() * level);
     structure_threshold = least_gain(null_structures, kRules.structure_share * level);
     // The largest gain first, in the order of trial where they are the same: who takes the first that will do fills in
@@ -189,7 +193,9 @@ bool reaches_too_far(const Accepted& a, CauseSearchResult& result) {
   result.refused.push_back(
       {a.form->cause(), a.form->formula, a.form->scale_name, a.scale.value, {0, reach.most, reach.reason}});
   SearchCandidate as_structure;
-  as_structure.name = reach.regressor, as_structure.columns = a.columns, as_structure.gain = a.gain;
+  as_structure.name = reach.regressor;
+  as_structure.columns = a.columns;
+  as_structure.gain = a.gain;
   as_structure.structure.shape = a.form->formula;
   result.unknown.push_back(told(as_structure, a.p));
   drop_means_of(a.columns, a.gain, result.accepted);
@@ -206,7 +212,8 @@ void refuse_impossible(CauseSearchResult& result) {
         result.refused.push_back({a.form->cause(), a.form->formula, e.name, e.value, possible[k]});
         return true;
       }
-      e.low = std::max(e.low, possible[k].least), e.high = std::min(e.high, possible[k].most);
+      e.low = std::max(e.low, possible[k].least);
+      e.high = std::min(e.high, possible[k].most);
     }
     return false;
   });
@@ -232,7 +239,8 @@ CauseSearchResult search(const Evidence& start, const CauseSearchOptions& option
     const SearchStep step(evidence, accepted, draws,
                           options.accept_p * (result.accepted.empty() ? 1 : kRules.further_level.value));
     if (step.named.empty() && step.structures.empty()) break;
-    result.threshold = step.threshold, result.structure_threshold = step.structure_threshold;
+    result.threshold = step.threshold;
+    result.structure_threshold = step.structure_threshold;
     const Beside beside{evidence, result.accepted, accepted, options.known};
     const auto cause = best_of(step.named, beside, step.threshold);
     const auto structure = best_of(step.structures, beside, step.structure_threshold);

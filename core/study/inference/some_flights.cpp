@@ -138,7 +138,8 @@ bool alike(const InSomeFlights& known, const std::vector<Segment>& segments) {
     for (std::size_t i = s.begin; i < s.end; ++i) {
       const auto& parts = known.found.columns.front().parts;
       const bool acts = std::any_of(parts.begin(), parts.end(), [i](auto& part) { return part.x[i] != 0; });
-      same += acts == s.acting ? 1 : 0, all += 1;
+      same += acts == s.acting ? 1 : 0;
+      all += 1;
     }
   return std::max(same, all - same) > (1 - kRotorRules.alike_windows) * all;
 }
@@ -157,7 +158,10 @@ class Questions {
       : found_(&found), known_(&known) {
     for (const auto& a : all)
       for (const auto& direction : directions(a)) asked_.push_back({&a, direction});
-    for (const auto& one : asked_) ++count_[kind_of(one)], of_accepted_ += accepted(one) ? 1 : 0;
+    for (const auto& one : asked_) {
+      ++count_[kind_of(one)];
+      of_accepted_ += accepted(one) ? 1 : 0;
+    }
   }
   const std::vector<Asked>& asked() const { return asked_; }
 

@@ -15,8 +15,10 @@ constexpr std::size_t kRotors = kLine4 - kLine1 + 1;
 /// Mean of a channel over measured windows [begin, end); NaN without one.
 double mean(const Observations& seen, std::size_t channel, std::size_t begin, std::size_t end) {
   double sum = 0, weight = 0;
-  for (std::size_t i = begin; i < end; ++i)
-    sum += seen.weight[channel][i] * seen.y[channel][i], weight += seen.weight[channel][i];
+  for (std::size_t i = begin; i < end; ++i) {
+    sum += seen.weight[channel][i] * seen.y[channel][i];
+    weight += seen.weight[channel][i];
+  }
   return sum / weight;
 }
 
@@ -112,8 +114,10 @@ void name_by_balance(Accepted& cause, const Observations& rest, bool taken_out, 
     bool acts = false;
     for (std::size_t k = 0; k < cause.columns.size(); ++k)
       for (const auto& [channel, x, aside] : cause.columns[k].parts)
-        if (channel >= kMotor1 && channel <= kMotor4)
-          added[channel - kMotor1] += cause.theta[static_cast<Eigen::Index>(k)] * x[i], acts = acts || x[i] != 0;
+        if (channel >= kMotor1 && channel <= kMotor4) {
+          added[channel - kMotor1] += cause.theta[static_cast<Eigen::Index>(k)] * x[i];
+          acts = acts || x[i] != 0;
+        }
     if (!acts || !(rest.weight[kMotor1][i] > 0)) continue;
     windows += 1;
     for (std::size_t r = 0; r < kRotors; ++r)

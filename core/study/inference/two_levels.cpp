@@ -16,7 +16,11 @@ constexpr auto kFewestASide = static_cast<std::size_t>(kRules.fewest_a_side.valu
 /// Sums of values on one side of a division.
 struct Side {
   double n = 0, sum = 0, square = 0;
-  void add(double x) { n += 1, sum += x, square += x * x; }
+  void add(double x) {
+    n += 1;
+    sum += x;
+    square += x * x;
+  }
   double scatter() const { return square - sum * sum / n; }
 };
 
@@ -26,7 +30,11 @@ class Divisions {
   Divisions(const std::vector<double>& values, double least_spread) : values_(values), least_(least_spread) {}
 
   /// Divisions of another kind. `tried`: how many there are; `lost`: degrees of freedom.
-  void begin(double tried, double lost) { tried_ = tried, lost_ = lost, clearest_ = -1; }
+  void begin(double tried, double lost) {
+    tried_ = tried;
+    lost_ = lost;
+    clearest_ = -1;
+  }
 
   /// `off`: sum of the `count` values that are called high, all values taken about their mean. Of one kind, t rises
   /// with off²/(count (n − count)): what is less clear by that than an earlier one has no less p, and most are.
@@ -100,7 +108,10 @@ std::optional<TwoLevels> two_levels(const std::vector<double>& values, double le
 
 Level level(const AmplitudeCourse& course, std::size_t begin, std::size_t end) {
   Level l;
-  for (std::size_t i = begin; i < end; ++i) l.value += course.weight[i] * course.value[i], l.weight += course.weight[i];
+  for (std::size_t i = begin; i < end; ++i) {
+    l.value += course.weight[i] * course.value[i];
+    l.weight += course.weight[i];
+  }
   if (l.weight > 0) l.value /= l.weight;
   return l;
 }
@@ -137,7 +148,9 @@ double likelihood(const AmplitudeCourse& course, double low, double high, double
   double square = 0, sum = 0, weight = 0;
   for (std::size_t i = 0; i < course.value.size(); ++i) {
     const double rest = course.value[i] - (i >= a.begin && i < a.end ? high : low), w = course.weight[i];
-    square += w * rest * rest, sum += w * rest, weight += w;
+    square += w * rest * rest;
+    sum += w * rest;
+    weight += w;
   }
   return -0.5 * (square - between * sum * sum / (1 + between * weight));
 }
@@ -151,10 +164,16 @@ Acting acting(const AmplitudeCourse& course, double low, double high, double bet
   double most = likelihood(course, low, high, between, best);
   const auto offer = [&](Acting a, double cost) {
     const double nats = likelihood(course, low, high, between, a) - cost;
-    if (nats > most) most = nats, best = a;
+    if (nats > most) {
+      most = nats;
+      best = a;
+    }
   };
   offer({0, n}, 0);
-  for (std::size_t at = fewest; at + fewest <= n; ++at) offer({at, n}, price), offer({0, at}, price);
+  for (std::size_t at = fewest; at + fewest <= n; ++at) {
+    offer({at, n}, price);
+    offer({0, at}, price);
+  }
   return best;
 }
 

@@ -37,7 +37,9 @@ Vehicle with(Vehicle vehicle, const VectorXd& theta, bool level, double late) {
   (level ? c.kd.horizontal : c.kd.vertical) = std::exp(theta[1]);
   if (level) c.latency = theta[2];
   const double lag = theta[level ? 3 : 2];
-  c.attitude_lag = (1 - late) * lag, c.latency += late * lag, c.feedback_delay += late * lag;
+  c.attitude_lag = (1 - late) * lag;
+  c.latency += late * lag;
+  c.feedback_delay += late * lag;
   return vehicle;
 }
 
@@ -113,7 +115,9 @@ Answers::Part linearised(const Compared& of, const FittedLog& log, const VectorX
   Answers::Part part{MatrixXd::Zero(n, n), MatrixXd::Zero(n, n), VectorXd::Zero(n)};
   for (std::size_t w = 0; w < here.size(); ++w) {
     const VectorXd score = J[w].transpose() * here[w];
-    part.information += J[w].transpose() * J[w], part.scores += score * score.transpose(), part.gradient += score;
+    part.information += J[w].transpose() * J[w];
+    part.scores += score * score.transpose();
+    part.gradient += score;
   }
   return part;
 }
@@ -138,7 +142,8 @@ Answers fitted(const Compared& of, std::span<const AnswerLog> given) {
     VectorXd g = VectorXd::Zero(of.start.size());
     for (const auto& log : logs) {
       found.logs.push_back(linearised(of, log, found.theta));
-      H += found.logs.back().information, g += found.logs.back().gradient;
+      H += found.logs.back().information;
+      g += found.logs.back().gradient;
     }
     bool better = false;
     for (; damping < 1e6 && !better; damping *= better ? 1 : 10) {
@@ -148,7 +153,9 @@ Answers fitted(const Compared& of, std::span<const AnswerLog> given) {
       const double there = total(next);
       if (!(there < best)) continue;
       better = best - there > 1e-9 * best;
-      found.theta = next, best = there, damping = std::max(1e-6, damping / 10);
+      found.theta = next;
+      best = there;
+      damping = std::max(1e-6, damping / 10);
       if (!better) return found;
     }
     if (!better) break;
@@ -167,7 +174,10 @@ VectorXd vector(std::initializer_list<double> values) {
 void with_forward(Compared& of) {
   const Index n = of.start.size();
   for (auto* v : {&of.start, &of.low, &of.high, &of.step}) v->conservativeResize(n + 1);
-  of.start[n] = 1, of.low[n] = -0.5, of.high[n] = 2, of.step[n] = 0.01;
+  of.start[n] = 1;
+  of.low[n] = -0.5;
+  of.high[n] = 2;
+  of.step[n] = 0.01;
 }
 
 }  // namespace

@@ -56,7 +56,10 @@ tl::expected<AnswerLog, LoopError> opened(const LoopLog& given, const Vehicle& v
 Eigen::VectorXd half_widths(const Answers& fitted, std::size_t windows) {
   const auto n = static_cast<double>(fitted.logs.size());
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(fitted.theta.size(), fitted.theta.size()), S = H;
-  for (const auto& part : fitted.logs) H += part.information, S += part.scores;
+  for (const auto& part : fitted.logs) {
+    H += part.information;
+    S += part.scores;
+  }
   const Eigen::MatrixXd inverse = inverse_of(H), cov = inverse * S * inverse;
   std::vector<Eigen::VectorXd> without;
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(fitted.theta.size());
@@ -74,7 +77,10 @@ Eigen::VectorXd half_widths(const Answers& fitted, std::size_t windows) {
 /// Half the interval of each parameter by one log alone, its residuals as scattered as all.
 Eigen::VectorXd alone(const Answers& fitted, const Answers::Part& part) {
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(fitted.theta.size(), fitted.theta.size()), S = H;
-  for (const auto& other : fitted.logs) H += other.information, S += other.scores;
+  for (const auto& other : fitted.logs) {
+    H += other.information;
+    S += other.scores;
+  }
   const double scatter = (inverse_of(H) * S).trace() / static_cast<double>(fitted.theta.size());
   return student_quantile(0.5 + kConfidence / 2, 30) * (scatter * inverse_of(part.information).diagonal()).cwiseSqrt();
 }
@@ -87,7 +93,8 @@ void tell(LoopFit& fit, const Answers& fitted, const Answers& other, std::span<c
     bool excited = true;
     for (std::size_t n = 0; n < logs.size(); ++n) {
       if (alone(fitted, fitted.logs[n])[at] <= (gain ? kUselessGain : kUselessDelay)) continue;
-      fit.unexcited.push_back({logs[n].name, key}), excited = false;
+      fit.unexcited.push_back({logs[n].name, key});
+      excited = false;
     }
     if (!excited) continue;
     const double value = middle[at], wide = half[at] + (gain ? kOtherGain : kOtherDelay) +
@@ -129,13 +136,14 @@ tl::expected<LoopFit, LoopError> fit_loop(std::span<const LoopLog> logs, const V
     Vehicle so_far = start;
     for (int round = 0; round < kRounds; ++round) {
       up[k] = fit_vertical(opened_logs, so_far, fit.by_thrust, late);
-      so_far.controller.kp.vertical = std::exp(up[k].theta[0]),
+      so_far.controller.kp.vertical = std::exp(up[k].theta[0]);
       so_far.controller.kd.vertical = std::exp(up[k].theta[1]);
       level[k] = fit_level(opened_logs, so_far, fit.by_attitude, late);
       so_far.controller.latency = level[k].theta[2];
     }
   }
-  tell(fit, level[0], level[1], kLevelKeys, logs, period / 4), tell(fit, up[0], up[1], kUpKeys, logs, 0);
+  tell(fit, level[0], level[1], kLevelKeys, logs, period / 4);
+  tell(fit, up[0], up[1], kUpKeys, logs, 0);
   return fit;
 }
 

@@ -44,7 +44,8 @@ void Observer::look_along(WindowRow& row, SampleRange w, const std::vector<Vec3>
   };
   row.sigma = along(Vec3::Zero());
   for (std::size_t k = 0; k < kPoints; ++k) {
-    row.speeds[k] = v[sample(k)].norm(), row.climbs[k] = v[sample(k)].z();
+    row.speeds[k] = v[sample(k)].norm();
+    row.climbs[k] = v[sample(k)].z();
     row.shares[k] = still ? 1.0 / kPoints : surroundings_.sigma(at(k)).sum() / (kPoints * row.sigma.sum());
   }
   for (std::size_t k = 0; k < kPoints && !still && surroundings_.has_map(); ++k)

@@ -37,7 +37,10 @@ void run(const Biquad& f, std::vector<double>& x) {
   double x1 = x.front(), x2 = x1, y1 = steady * x1, y2 = y1;
   for (double& value : x) {
     const double y = f.b0 * value + f.b1 * x1 + f.b2 * x2 - f.a1 * y1 - f.a2 * y2;
-    x2 = x1, x1 = value, y2 = y1, y1 = y;
+    x2 = x1;
+    x1 = value;
+    y2 = y1;
+    y1 = y;
     value = y;
   }
 }

@@ -149,7 +149,9 @@ void Observer::follow_thrust() {
   };
   for (const auto& [window, delay, slope, mean, own] : all_.thrust) {
     WindowRow& row = all_.seen.windows[window];
-    row.delay_gain = design(delay), row.slope_gain = design(slope), row.mean_gain = design(mean);
+    row.delay_gain = design(delay);
+    row.slope_gain = design(slope);
+    row.mean_gain = design(mean);
   }
 }
 

@@ -22,7 +22,10 @@ double power(const std::vector<double>& tapered, std::size_t k) {
   const std::complex<double> turn =
       std::polar(1.0, -2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(tapered.size()));
   std::complex<double> sum = 0, at = 1;
-  for (const double x : tapered) sum += x * at, at *= turn;
+  for (const double x : tapered) {
+    sum += x * at;
+    at *= turn;
+  }
   return std::norm(sum);
 }
 
@@ -67,7 +70,11 @@ GustFit best_of(const Periodograms& seen, const Shape& shape) {
       for (int j = -r_reach; j <= r_reach; ++j) {
         const double at = std::clamp(about_tau + i * tau_step, low, high), r = about_r + j * r_step;
         const double value = seen.ln_likelihood(shape, std::exp(at), std::exp(r));
-        if (value > best.ln_likelihood) best = {std::exp(at), value}, ln_tau = at, ln_r = r;
+        if (value > best.ln_likelihood) {
+          best = {std::exp(at), value};
+          ln_tau = at;
+          ln_r = r;
+        }
       }
     tau_reach = r_reach = 1;
   }

@@ -14,7 +14,8 @@ std::vector<double> slow(const Series& s, SampleRange w, const std::vector<doubl
     double sum = 0, weights = 0;
     for (std::size_t k = 0; k < z.size(); ++k) {
       const double weight = bell(s, w.begin + i, w.begin + k, width);
-      sum += weight * z[k], weights += weight;
+      sum += weight * z[k];
+      weights += weight;
     }
     out[i] = sum / weights;
   }
@@ -28,7 +29,8 @@ void FirstStage::add(const std::array<std::vector<double>, 2>& z, const std::arr
   for (std::size_t i = 0; i < 2; ++i)
     for (std::size_t k = 0; k < 2; ++k) {
       const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(k);
-      instruments(row, column) += product(z[i], z[k]), followed(row, column) += product(z[i], thrust[k]);
+      instruments(row, column) += product(z[i], z[k]);
+      followed(row, column) += product(z[i], thrust[k]);
     }
 }
 
@@ -55,7 +57,8 @@ std::vector<std::pair<std::size_t, double>> DelayStage::designs() const {
     double product = 0, square = 0;
     for (const auto& w : seen_) {
       const double g = between(w.design, shift);
-      product += g * w.y, square += g * g;
+      product += g * w.y;
+      square += g * g;
     }
     shift = square > 0 ? product / square : 0;
   }

@@ -60,7 +60,8 @@ struct Moment {
       const double at = std::clamp(q, 0.0, n - 1.0);
       const std::size_t k = std::min(static_cast<std::size_t>(at), n - 2);
       const double share = at - static_cast<double>(k);
-      weight[k] += (1 - share) * z[i] / std::sqrt(square), weight[k + 1] += share * z[i] / std::sqrt(square);
+      weight[k] += (1 - share) * z[i] / std::sqrt(square);
+      weight[k + 1] += share * z[i] / std::sqrt(square);
     }
     return weight;
   }
@@ -74,7 +75,10 @@ struct Moment {
 struct FirstStage {
   Eigen::Matrix2d instruments = Eigen::Matrix2d::Zero(), followed = Eigen::Matrix2d::Zero();
   void add(const std::array<std::vector<double>, 2>& z, const std::array<std::vector<double>, 2>& thrust);
-  void add(const FirstStage& other) { instruments += other.instruments, followed += other.followed; }
+  void add(const FirstStage& other) {
+    instruments += other.instruments;
+    followed += other.followed;
+  }
   /// Columns: T/m − g and ȧ as combinations of z = (level, rate); the nominal itself where nothing was excited.
   Eigen::Matrix2d coefficients() const;
 };

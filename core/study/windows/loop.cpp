@@ -43,7 +43,10 @@ LoopMotion loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle,
   for (std::size_t i = 0; i < s.size(); ++i) {
     const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
     const bool gap = dt > kWindowRules.restart;
-    if (gap) p = s.p[i], v = s.v[i];  // start again where the vehicle is
+    if (gap) {
+      p = s.p[i];
+      v = s.v[i];
+    }  // start again where the vehicle is
     const int steps = gap ? 1 : std::max(1, static_cast<int>(std::ceil(dt / kWindowRules.loop_step)));
     for (int k = 0; k < steps; ++k) {
       const double h = gap ? 0 : dt / steps, now = s.t[i] - dt + (k + 1) * h;
@@ -58,7 +61,9 @@ LoopMotion loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle,
       v += h * (produced - drag * Vec3(v.x(), v.y(), 0));
       p += h * v;
     }
-    out.p.push_back(p), out.v.push_back(v), out.a.push_back(produced);
+    out.p.push_back(p);
+    out.v.push_back(v);
+    out.a.push_back(produced);
   }
   return out;
 }

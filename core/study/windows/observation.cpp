@@ -118,7 +118,10 @@ std::optional<Gate> Observer::misplaced(const Series& s, SampleRange w) const {
 void Observer::smooth_voltage() {
   const auto windows = std::span(all_.seen.windows).subspan(all_.seen.first.back());
   std::vector<double> t, volts;
-  for (const auto& w : windows) t.push_back(w.t), volts.push_back(w.voltage);
+  for (const auto& w : windows) {
+    t.push_back(w.t);
+    volts.push_back(w.voltage);
+  }
   const auto course = slow_course(t, volts);
   for (std::size_t i = 0; i < windows.size(); ++i) windows[i].voltage = course[i];
 }
@@ -127,14 +130,21 @@ void Observer::put_tails() {
   std::vector<Fourth> whole;
   std::vector<std::size_t> of;
   for (std::size_t i = 0; i < all_.tails.size(); ++i)
-    if (all_.tails[i].at_once > 0) whole.push_back(all_.tails[i]), of.push_back(i);
+    if (all_.tails[i].at_once > 0) {
+      whole.push_back(all_.tails[i]);
+      of.push_back(i);
+    }
   const auto y = tails(whole);
-  for (std::size_t i = 0; i < y.size(); ++i) all_.seen.y[kTail][of[i]] = y[i], all_.seen.weight[kTail][of[i]] = 1;
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    all_.seen.y[kTail][of[i]] = y[i];
+    all_.seen.weight[kTail][of[i]] = 1;
+  }
 }
 
 void Observer::put(std::size_t channel, double y, double weight) {
   if (!std::isfinite(y) || !(weight > 0)) return;
-  all_.seen.y[channel].back() = y, all_.seen.weight[channel].back() = weight;
+  all_.seen.y[channel].back() = y;
+  all_.seen.weight[channel].back() = weight;
 }
 
 WindowRow Observer::placed(const log::FlightLog& log, const Series& s, SampleRange w) {
@@ -154,7 +164,8 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, SampleRan
   // would explain them. Where the set-points lead is known without them, unless the craft flies elsewhere.
   const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kWindowRules.stray;
   const auto &p = as_told ? s.p_nominal : s.p, &v = as_told ? s.v_nominal : s.v;
-  row.p_W = mean_of(p), row.v_W = mean_of(v);
+  row.p_W = mean_of(p);
+  row.v_W = mean_of(v);
   const auto& kp = vehicle_.controller.kp;
   row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
   row.held_off = vehicle_.controller.velocity_integrator.horizontal > 0;
@@ -167,7 +178,10 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, SampleRan
     return square;
   };
   row.varied2 = varied2(v);
-  if (as_told) row.asked_W = mean_of(s.a_nominal), row.asked2 = varied2(s.a_nominal);
+  if (as_told) {
+    row.asked_W = mean_of(s.a_nominal);
+    row.asked2 = varied2(s.a_nominal);
+  }
   row.off_W = as_told ? Vec3(mean_of(s.p) - row.p_W) : Vec3(Vec3::Zero());
   // The mean of the measured speed would hold every gust rectified: without set-points, the way made good.
   row.speed = as_told ? mean(w, 0.0, [&](std::size_t i) { return v[i].norm(); }) : row.v_W.norm();
@@ -175,7 +189,8 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, SampleRan
   if (!s.R_WB.empty()) row.R_WB = mean(w, Mat3(Mat3::Zero()), [&](std::size_t i) { return heading(s.R_WB[i]); });
   row.yaw = std::atan2(row.R_WB(1, 0), row.R_WB(0, 0));
   row.thrust_acc = s.thrust_acc.empty() ? kGravity : mean(w, 0.0, [&](std::size_t i) { return s.thrust_acc[i]; });
-  row.voltage = column_mean("battery_v"), row.temperature = column_mean("temperature_c");
+  row.voltage = column_mean("battery_v");
+  row.temperature = column_mean("temperature_c");
   row.around = surroundings_.around(row.p_W);
   if (!surroundings_.has_map()) {  // imported recordings say what stood below and above (backwash import)
     if (log.has("surface_z_m")) row.around.height = row.p_W.z() - column_mean("surface_z_m");
@@ -231,7 +246,10 @@ void Observer::add_windows(const log::FlightLog& log, const Series& s, const Rot
                            const std::vector<SampleRange>& good) {
   std::vector<Residual> residuals;
   for (const SampleRange w : good) {
-    for (std::size_t c = 0; c < kChannels; ++c) all_.seen.y[c].push_back(0), all_.seen.weight[c].push_back(0);
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      all_.seen.y[c].push_back(0);
+      all_.seen.weight[c].push_back(0);
+    }
     all_.seen.windows.push_back(placed(log, s, w));
     WindowRow& row = all_.seen.windows.back();
     row.flight = all_.seen.flights - 1;

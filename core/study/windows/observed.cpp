@@ -63,7 +63,10 @@ struct Visitor {
   void visit(Gate& gate) {
     auto number = static_cast<std::size_t>(gate);
     visit(number);
-    if (number > static_cast<std::size_t>(Gate::outside)) number = 0, archive.refuse();
+    if (number > static_cast<std::size_t>(Gate::outside)) {
+      number = 0;
+      archive.refuse();
+    }
     gate = static_cast<Gate>(number);
   }
   template <int rows, int columns>
@@ -131,7 +134,8 @@ struct Visitor {
     auto& [flights, windows, first, units, row_period, y, weight, gated_out, missing] = seen;
     (*this)(flights, windows, first, row_period, y, weight);
     visit_as<std::pair<Gate, std::size_t>>(gated_out);
-    static_cast<void>(units), static_cast<void>(missing);  // made when all flights are together
+    static_cast<void>(units);
+    static_cast<void>(missing);  // made when all flights are together
   }
 
  public:
@@ -192,7 +196,10 @@ Observed Observer::take() {
 void Observer::expect(std::size_t windows) {
   const std::size_t all = all_.seen.windows.size() + windows;
   all_.seen.windows.reserve(all);
-  for (std::size_t c = 0; c < kChannels; ++c) all_.seen.y[c].reserve(all), all_.seen.weight[c].reserve(all);
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    all_.seen.y[c].reserve(all);
+    all_.seen.weight[c].reserve(all);
+  }
 }
 
 void Observer::add(Observed flights) {
@@ -208,7 +215,10 @@ void Observer::add(Observed flights) {
   for (std::size_t f = 1; f < more.first.size(); ++f) seen.first.push_back(windows + more.first[f]);
   seen.row_period = std::max(seen.row_period, more.row_period);
   for (const auto& [gate, count] : more.gated_out) seen.gated_out[gate] += count;
-  for (auto& moments : flights.thrust) moments.window += windows, all_.thrust.push_back(moments);
+  for (auto& moments : flights.thrust) {
+    moments.window += windows;
+    all_.thrust.push_back(moments);
+  }
   for (std::size_t k = 0; k < all_.command.size(); ++k) all_.command[k].add(flights.command[k], windows);
   all_.tilt.add(flights.tilt, windows);
   all_.tails.insert(all_.tails.end(), flights.tails.begin(), flights.tails.end());

@@ -64,7 +64,8 @@ std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s,
   const Rates rates = rates_of(phases, s, begin, end);
   for (std::size_t rotor = 0; rotor < 4; ++rotor) {
     const bool has_motor = log.has(name_of("motor", rotor)), has_rpm = log.has(name_of("rpm", rotor));
-    motors = motors && has_motor, rpms = rpms && has_rpm;
+    motors = motors && has_motor;
+    rpms = rpms && has_rpm;
     if (has_motor) {
       const auto& motor = log.column(name_of("motor", rotor));
       double sum = 0;

@@ -27,13 +27,21 @@ double likeness(const Gusts& a, const Gusts& b) {
       if (!(a.weight[c][i] > 0 && b.weight[c][j] > 0)) continue;
       const double x = a.y[c][i], y = b.y[c][j];
       Shared& s = axes[c];
-      s.n += 1, s.x += x, s.y += y, s.xx += x * x, s.yy += y * y, s.xy += x * y;
+      s.n += 1;
+      s.x += x;
+      s.y += y;
+      s.xx += x * x;
+      s.yy += y * y;
+      s.xy += x * y;
     }
   }
   double n = 0, xx = 0, yy = 0, xy = 0;
   for (const Shared& s : axes) {
     if (s.n == 0) continue;
-    n += s.n, xx += s.xx - s.x * s.x / s.n, yy += s.yy - s.y * s.y / s.n, xy += s.xy - s.x * s.y / s.n;
+    n += s.n;
+    xx += s.xx - s.x * s.x / s.n;
+    yy += s.yy - s.y * s.y / s.n;
+    xy += s.xy - s.x * s.y / s.n;
   }
   return n >= kWindowRules.same_windows && xx > 0 && yy > 0 ? xy / std::sqrt(xx * yy) : 0;
 }
@@ -43,7 +51,10 @@ void centre(Gusts& gusts) {
   for (std::size_t c = 0; c < gusts.y.size(); ++c) {
     double sum = 0, n = 0;
     for (std::size_t i = 0; i < gusts.t.size(); ++i)
-      if (gusts.weight[c][i] > 0) sum += gusts.y[c][i], n += 1;
+      if (gusts.weight[c][i] > 0) {
+        sum += gusts.y[c][i];
+        n += 1;
+      }
     for (double& y : gusts.y[c]) y -= n > 0 ? sum / n : 0;
   }
 }
@@ -53,9 +64,12 @@ void centre(Gusts& gusts) {
 Gusts gusts_of(const Observations& seen, std::size_t flight) {
   Gusts gusts;
   for (std::size_t i = seen.first[flight]; i < seen.first[flight + 1]; ++i) {
-    gusts.t.push_back(seen.windows[i].t), gusts.near.push_back(kWindowRules.same_time * seen.windows[i].duration);
-    for (std::size_t k = 0; k < 3; ++k)
-      gusts.y[k].push_back(seen.y[kVarX + k][i]), gusts.weight[k].push_back(seen.weight[kVarX + k][i]);
+    gusts.t.push_back(seen.windows[i].t);
+    gusts.near.push_back(kWindowRules.same_time * seen.windows[i].duration);
+    for (std::size_t k = 0; k < 3; ++k) {
+      gusts.y[k].push_back(seen.y[kVarX + k][i]);
+      gusts.weight[k].push_back(seen.weight[kVarX + k][i]);
+    }
   }
   return gusts;
 }

@@ -81,7 +81,9 @@ void read_commands(Series& s, const Commands& cmd, const Vehicle& vehicle) {
     auto found = answers(s, cmd, vehicle, lags);
     std::ranges::move(found, s.answer.begin());
   }
-  s.p_nominal = std::move(nominal.p), s.v_nominal = std::move(nominal.v), s.a_nominal = std::move(nominal.a);
+  s.p_nominal = std::move(nominal.p);
+  s.v_nominal = std::move(nominal.v);
+  s.a_nominal = std::move(nominal.a);
 }
 
 }  // namespace

@@ -17,7 +17,9 @@ std::vector<double> detrended(std::span<const double> x) {
   double mean = 0, slope = 0, square = 0;
   for (std::size_t i = 0; i < x.size(); ++i) {
     const double s = static_cast<double>(i) - middle;
-    mean += x[i] / n, slope += s * x[i], square += s * s;
+    mean += x[i] / n;
+    slope += s * x[i];
+    square += s * s;
   }
   slope = square > 0 ? slope / square : 0;
   std::vector<double> out(x.size());
@@ -59,7 +61,8 @@ double left_by_a_line(std::size_t n, double dt, double tau) {
     double square = 0, sum = 0, before = 0;  // Σ_{b<a} ρ^{a−b} f_b
     for (std::size_t a = 0; a < n; ++a) {
       const double here = f(static_cast<double>(a) - middle);
-      sum += here * here + 2 * here * before, square += here * here;
+      sum += here * here + 2 * here * before;
+      square += here * here;
       before = rho * (before + here);
     }
     return sum / (square * count);
@@ -85,7 +88,10 @@ struct Flattened {
 
 Flattened flattened(std::span<const double> x) {
   double first = 0, second = 0;
-  for (std::size_t i = 2; i < x.size(); ++i) first += x[i] * x[i - 1], second += x[i] * x[i - 2];
+  for (std::size_t i = 2; i < x.size(); ++i) {
+    first += x[i] * x[i - 1];
+    second += x[i] * x[i - 2];
+  }
   Flattened flat{{}, first > 0 ? std::clamp(second / first, 0.0, 1.0) : 0.0};
   for (std::size_t i = 1; i < x.size(); ++i) flat.x.push_back(x[i] - flat.decay * x[i - 1]);
   return flat;
@@ -104,8 +110,10 @@ std::pair<double, double> powers(const std::vector<double>& x, std::span<const d
                     hz = std::polar(1.0, 2 * std::numbers::pi * t[i + 1]);
       own += line;
       Complex detuned = std::polar(1.0, 2 * std::numbers::pi * kWindowRules.line_nearest * t[i + 1]);
-      for (std::size_t k = 0; k < kBeside; ++k, detuned *= hz)
-        detunings[2 * k] += line * detuned, detunings[2 * k + 1] += line * std::conj(detuned);
+      for (std::size_t k = 0; k < kBeside; ++k, detuned *= hz) {
+        detunings[2 * k] += line * detuned;
+        detunings[2 * k + 1] += line * std::conj(detuned);
+      }
     }
     at += std::norm(own);
     for (const Complex& z : detunings) beside += std::norm(z) / (2 * kBeside);
@@ -131,7 +139,9 @@ std::optional<RotorLine> rotor_line(std::span<const double> x, std::span<const d
       return std::nullopt;
     }
     const auto [at, around] = powers(flat.x, t, phase, harmonic, blocks);
-    count += static_cast<double>(blocks), line += at, beside += around;
+    count += static_cast<double>(blocks);
+    line += at;
+    beside += around;
     if (harmonic > 1) break;
     found.folded = folded / rate;
     const double gain2 = flat.gain2(found.folded);

@@ -82,7 +82,8 @@ Vec3 MapView::sigma(const Vec3& p_W) {
   map::for_corners(q, [&](const Index3& v, const Vec3& share) {
     if (!(share.prod() > kWindowRules.corner_least)) return;
     if (!buried && in_solid(v)) return;
-    ln += share.prod() * lattice_ln_sigma(v), free += share.prod();
+    ln += share.prod() * lattice_ln_sigma(v);
+    free += share.prod();
   });
   return free > 0 ? Vec3((ln / free).array().exp()) : exactly(p_W);
 }

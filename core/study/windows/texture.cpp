@@ -45,7 +45,8 @@ Texture texture_of(const std::vector<Residual>& windows, double rate_hz) {
       const auto& x = w.x[static_cast<std::size_t>(axis)];
       for (std::size_t k = 0; k < 3; ++k) c[k] += shared(x, k) / w.sigma[axis];
       for (std::size_t k = 0; k < t.lags.size(); ++k) t.correlation[k] += shared(x, t.lags[k]) / w.sigma[axis];
-      weight += 1 / w.sigma[axis], count += 1;
+      weight += 1 / w.sigma[axis];
+      count += 1;
     }
     const double white = white_part(c[0], c[1], c[2]);
     if (weight > 0) t.white[axis] = white / weight;
@@ -80,7 +81,10 @@ Fourth fourth_moments(const Residual& window, const Texture& t) {
 std::vector<double> tails(const std::vector<Fourth>& windows) {
   Fourth mean;
   const double n = static_cast<double>(windows.size());
-  for (const auto& w : windows) mean.at_once += w.at_once / n, mean.apart += w.apart / n;
+  for (const auto& w : windows) {
+    mean.at_once += w.at_once / n;
+    mean.apart += w.apart / n;
+  }
   if (!(mean.at_once > 0) || !(mean.apart > 0)) return {};
   std::vector<double> y;
   y.reserve(windows.size());

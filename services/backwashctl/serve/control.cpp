@@ -153,7 +153,10 @@ void Control::carry_out(const Wish& wish) {
   const std::lock_guard lock(mutex_);
   ours_until_ = Clock::now() + seconds(kLease_s);
   if (!result) return say(wish, "silent", "no daemon answered");
-  if (result->result == backwash_msgs_msg_dds__ACK_NOT_YOURS) holder_.reset(), ours_until_ = {};
+  if (result->result == backwash_msgs_msg_dds__ACK_NOT_YOURS) {
+    holder_.reset();
+    ours_until_ = {};
+  }
   say(wish, result->result == backwash_msgs_msg_dds__ACK_ACCEPTED ? "accepted" : "refused", result->reason);
 }
 

@@ -81,10 +81,22 @@ class Controller {
     asked_ = {c.sequence, 0, now_};
     // Our duty, whatever the daemon believes (docs/plain_link.md): nothing is disarmed that may be in the air.
     if (c.request == PLAIN_REQUEST_DISARM && !on_ground()) return;
-    if (c.request == PLAIN_REQUEST_FOLLOW) vehicle_.send_follow_setpoints(), asked_.command = kCommandSetMode;
-    if (c.request == PLAIN_REQUEST_ARM) vehicle_.send_arm(true), asked_.command = kCommandArm;
-    if (c.request == PLAIN_REQUEST_DISARM) vehicle_.send_arm(false), asked_.command = kCommandArm;
-    if (c.request == PLAIN_REQUEST_LAND) vehicle_.send_land(), asked_.command = kCommandLand;
+    if (c.request == PLAIN_REQUEST_FOLLOW) {
+      vehicle_.send_follow_setpoints();
+      asked_.command = kCommandSetMode;
+    }
+    if (c.request == PLAIN_REQUEST_ARM) {
+      vehicle_.send_arm(true);
+      asked_.command = kCommandArm;
+    }
+    if (c.request == PLAIN_REQUEST_DISARM) {
+      vehicle_.send_arm(false);
+      asked_.command = kCommandArm;
+    }
+    if (c.request == PLAIN_REQUEST_LAND) {
+      vehicle_.send_land();
+      asked_.command = kCommandLand;
+    }
   }
 
   bool on_ground() const {
@@ -152,7 +164,10 @@ int main(int argc, char** argv) {
   if (argc != 3) return 64;
   std::signal(SIGTERM, [](int) { stopped = 1; });
   auto vehicle = SerialPort::open(argv[1], 921600);
-  if (!vehicle) return std::fprintf(stderr, "%s: %s\n", argv[1], describe(vehicle.error()).c_str()), 74;
+  if (!vehicle) {
+    std::fprintf(stderr, "%s: %s\n", argv[1], describe(vehicle.error()).c_str());
+    return 74;
+  }
   Controller controller(std::move(*vehicle), argv[2]);
   for (int tick = 0; stopped == 0; ++tick) {
     controller.step(tick, std::chrono::steady_clock::now());

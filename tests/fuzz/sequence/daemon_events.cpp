@@ -124,7 +124,10 @@ std::optional<track::OdometrySample> DaemonRig::read(const track::OdometrySample
   track::OdometrySample s = sample;
   if (const auto* e = lasting(Kind::vio_shift)) s.state.p_W += Vec3(e->a, e->b, e->c);
   if (const auto* e = lasting(Kind::vio_drift)) s.state.p_W += drifted_ += 0.02 * Vec3(e->a, e->b, e->c);
-  if (const auto* e = lasting(Kind::vio_scale)) s.state.p_W *= 1 + e->a, s.state.v_W *= 1 + e->a;
+  if (const auto* e = lasting(Kind::vio_scale)) {
+    s.state.p_W *= 1 + e->a;
+    s.state.v_W *= 1 + e->a;
+  }
   Eigen::Quaterniond q(s.q[0], s.q[1], s.q[2], s.q[3]);
   if (const auto* e = lasting(Kind::vio_turn)) {
     q = about_z(e->a) * q;

@@ -67,7 +67,9 @@ TEST_P(HoldAndStop, AreFlownWithoutAStepOfTheSetPoint) {
     failed += violation.has_value();
     EXPECT_FALSE(violation) << "sequence " << seed << ", tick " << violation->tick << ": " << violation->what;
     EXPECT_GT(rig.plans(), 10) << "sequence " << seed << " hardly flew";
-    plans += rig.plans(), ticks += rig.ticks(), outside += rig.outside();
+    plans += rig.plans();
+    ticks += rig.ticks();
+    outside += rig.outside();
   }
   std::printf("%lu of %lu sequences failed, %ld segments flown, %lu of %ld ticks outside\n", failed, count, plans,
               outside, ticks);

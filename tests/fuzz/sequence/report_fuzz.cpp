@@ -159,7 +159,10 @@ TEST_F(Reports, TellEachLogThatTheDaemonWrote) {
     const std::string page = content(folder_ / "page.html");
     EXPECT_NE(page.find("</html>"), page.npos);
     EXPECT_NE(page.find(std::to_string(own.inside) + " of " + std::to_string(own.judged) + "</td>"), page.npos);
-    cut += !own.whole, unflown += own.setpoints == 0, held += own.held, outside += own.inside < own.judged;
+    cut += !own.whole;
+    unflown += own.setpoints == 0;
+    held += own.held;
+    outside += own.inside < own.judged;
     good += json["ok"].get<bool>();
   }
   std::printf("%lu logs: %lu cut, %lu without a set-point, %lu held, %lu outside, %lu good\n", count, cut, unflown,

@@ -160,7 +160,10 @@ std::optional<std::string> Watch::smoothness(const Seen& now) const {
 }
 
 std::optional<std::string> Watch::check(const Seen& now) {
-  if (!started_) last_ = now, started_ = true;
+  if (!started_) {
+    last_ = now;
+    started_ = true;
+  }
   hear_pilot(now);
   auto broken = hear_switch(now);
   if (!broken) broken = silence(now);
