@@ -217,18 +217,15 @@ TEST(Supervisor, HoldsAndThenLandsWhenTheAutopilotsPoseGrowsOldAndDoesNotEnableO
 
 // The table of docs/modes.md, as the code would write it: neighbours of the same modes are one row.
 std::string table() {
-  std::string text = "| in | when | to |\n| --- | --- | --- |\n", from_before, to_before;
+  std::string text = "| in | when | to |\n| --- | --- | --- |\n", before;
   for (const Transition& t : transitions()) {
-    std::string from;
+    std::string from = "|";
     for (int m = 0; m < kModes; ++m)
       if (contains(t.from, static_cast<Mode>(m)))
-        from += (from.empty() ? "" : ", ") + std::string(to_string(static_cast<Mode>(m)));
-    const std::string to = std::string(" | ") + to_string(t.to) + " |\n";
-    if (from == from_before && to == to_before)
-      text.replace(text.size() - to.size(), to.size(), std::string("; ") + to_string(t.when) + to);
-    else
-      text += "| " + from + " | " + to_string(t.when) + to;
-    from_before = from, to_before = to;
+        from += (from == "|" ? " " : ", ") + std::string(to_string(static_cast<Mode>(m)));
+    const std::string when = to_string(t.when), to = std::string(" | ") + to_string(t.to) + " |\n";
+    text = from + to == before ? text.insert(text.size() - to.size(), "; " + when) : text + from + " | " + when + to;
+    before = from + to;
   }
   return text;
 }
