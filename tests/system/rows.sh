@@ -31,7 +31,7 @@ logs.insert(7, "world/again.csv")
 made = ["--map", "world/map.bt", "--vehicle", "world/vehicle.toml", "--model", "builtin:quad-5in"]
 
 # By three processes, in any order, put together in the order of the logs.
-for group, more in ([], ["--json"]), ([], ["--quick"]), (["--group", "day"], ["--json", "--quick"]), ([], ["--json", "--quick", "--anytime"]):
+for group, more in ([], ["--json"]), ([], ["--quick"]), (["--group", "day"], ["--json", "--quick"]):
     parts = {first: say("study", "--rows", *made, *group, "--log", *logs[first:first + 5]) for first in (10, 0, 5)}
     assert [part.count("\n") for part in parts.values()] == [3, 5, 5]
     pathlib.Path("rows.jsonl").write_text("".join(parts[first] for first in (0, 5, 10)))
@@ -69,7 +69,7 @@ refused("study", rows, [*made, "--group", "day"], "another group")
 refused("study", rows.replace('"version":"', '"version":"9.', 1), made, "bad.jsonl:1: was changed")
 refused("study", open("grouped.jsonl").read(), made, "another group")
 refused("study", rows, [*made, "--log", logs[0]], "--from takes the place of --log", code=64)
-for extra in (["--json"], ["--report", "c.html"], ["--out", "c.toml"], ["--anytime"]):
+for extra in (["--json"], ["--report", "c.html"], ["--out", "c.toml"]):
     assert "--rows studies nothing" in say("study", "--rows", *made, "--log", logs[0], *extra, code=64)
 assert "--residuals needs the logs" in say("study", *made, "--from", "rows.jsonl", "--residuals", "--report", "c.html", code=64)
 assert not os.path.exists("c.html")
