@@ -230,7 +230,8 @@ int submit(const CampaignOptions& options) {
                        folder}) +
            more + " >>" + shell_line({folder}) + "/" + log + ".log 2>&1\n";
   };
-  Words first = {"sbatch", "--parsable"};
+  Words first(1, "sbatch");
+  first.push_back("--parsable");
   for (const auto& [name, value] :
        {std::pair{"--partition=", &options.partition}, {"--time=", &options.time}, {"--account=", &options.account}})
     if (!value->empty()) first.push_back(name + *value);
