@@ -3,11 +3,11 @@
 
 #include <cstddef>
 
-/// Before a kernel: compiled for AVX-512, AVX2 and the baseline and picked at run time on x86.
+/// Before a kernel: compiled for AVX2 and the baseline and picked at run time on x86.
 // Loaders that call a resolver before a sanitizer has started would crash.
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define BACKWASH_LEVELS
-#define BACKWASH_CLONES [[gnu::target_clones("avx512f", "avx2", "default")]]
+#define BACKWASH_CLONES [[gnu::target_clones("avx2", "default")]]
 #else
 #define BACKWASH_CLONES
 #endif
@@ -15,10 +15,6 @@
 namespace backwash::field {
 
 #ifdef BACKWASH_LEVELS
-template <typename Kernel, typename... Arguments>
-[[gnu::target("avx512f")]] auto run_512(Arguments... arguments) noexcept {
-  return Kernel::template run<64>(arguments...);
-}
 template <typename Kernel, typename... Arguments>
 [[gnu::target("avx2")]] auto run_256(Arguments... arguments) noexcept {
   return Kernel::template run<32>(arguments...);
@@ -30,7 +26,6 @@ template <typename Kernel, typename... Arguments>
 template <typename Kernel, typename... Arguments>
 auto run_native(Arguments... arguments) noexcept {
 #ifdef BACKWASH_LEVELS
-  if (__builtin_cpu_supports("avx512f")) return run_512<Kernel>(arguments...);
   if (__builtin_cpu_supports("avx2")) return run_256<Kernel>(arguments...);
 #endif
   return Kernel::template run<16>(arguments...);

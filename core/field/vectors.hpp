@@ -41,13 +41,6 @@ struct Native<32> {
   using Ints = vectors::EightInts;
   using Doubles = vectors::Quad;
 };
-template <>
-struct Native<64> {
-  using Words = vectors::Words;
-  using Floats = vectors::Floats;
-  using Ints = vectors::Ints;
-  using Doubles = vectors::Doubles;
-};
 
 constexpr double kHalf = 0.5 + kTouch;  // of a closed box with its tolerance, voxel edges
 constexpr double kRound = 0x1.8p52;     // x + kRound has the nearest integer to x in its last bits

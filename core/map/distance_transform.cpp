@@ -4,13 +4,6 @@
 #include <algorithm>
 #include <vector>
 
-// Loaders that call a resolver before a sanitizer has started would crash.
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define BACKWASH_CLONES [[gnu::target_clones("avx2", "default")]]
-#else
-#define BACKWASH_CLONES
-#endif
-
 namespace backwash::map {
 namespace {
 
@@ -21,7 +14,6 @@ constexpr auto kFar = static_cast<Square>(kFarthestSquared);
 constexpr std::size_t kChunk = 64;  // voxels whose search ends together
 
 /// The steps to the nearest obstacle of the layer below or above, one more where a voxel is free.
-BACKWASH_CLONES
 void step_on(const Cell* cells, const std::uint8_t* before, std::uint8_t* steps, std::size_t count) noexcept {
   for (std::size_t n = 0; n < count; ++n) {
     const auto next = static_cast<std::uint8_t>(std::min<int>(before[n], kMostSteps) + 1);
@@ -29,7 +21,6 @@ void step_on(const Cell* cells, const std::uint8_t* before, std::uint8_t* steps,
   }
 }
 
-BACKWASH_CLONES
 void take_squares(const std::uint8_t* below, const std::uint8_t* above, Square* squares, std::size_t count) noexcept {
   for (std::size_t n = 0; n < count; ++n) {
     const int half_voxels = std::max(0, 2 * std::min<int>(below[n], above[n]) - 1);
@@ -38,7 +29,6 @@ void take_squares(const std::uint8_t* below, const std::uint8_t* above, Square* 
 }
 
 /// Lowers out[n] to the least of a and b there plus a square; the largest of what comes out.
-BACKWASH_CLONES
 Square lower(Square* out, const Square* a, const Square* b, Square square, std::size_t count) noexcept {
   Square largest = 0;
   for (std::size_t n = 0; n < count; ++n) {
@@ -51,7 +41,6 @@ Square lower(Square* out, const Square* a, const Square* b, Square square, std::
   return largest;
 }
 
-BACKWASH_CLONES
 void store(const Square* squares, std::uint16_t* stored, std::size_t count) noexcept {
   for (std::size_t n = 0; n < count; ++n) stored[n] = static_cast<std::uint16_t>(static_cast<int>(squares[n]));
 }

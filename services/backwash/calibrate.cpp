@@ -6,7 +6,6 @@
 #include "core/study/calibrate/model_text.hpp"
 #include "services/backwash/calibrate_input.hpp"
 #include "services/backwash/calibrate_page.hpp"
-#include "services/backwash/calibrate_rows.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
@@ -19,11 +18,11 @@ using namespace study::calibrate;
 
 struct CalibrateOptions {
   CampaignFiles files;
-  std::string vehicle, base_model = "builtin:quad-5in", out, report, from;
+  std::string vehicle, base_model = "builtin:quad-5in", out, report;
   double quantile = 0.9;
   std::uint64_t seed = 1;
   int bootstraps = 200;
-  bool keep_base = false, judge = false, rows = false, json = false, force = false;
+  bool keep_base = false, judge = false, json = false, force = false;
 };
 
 Json to_json(const Interval& i) { return {i.low, i.high}; }
@@ -143,28 +142,17 @@ int judge(const Campaign& campaign, const Model& model, const CalibrateOptions& 
 }
 
 void check(const CalibrateOptions& options) {
-  if (options.files.logs.empty() == options.from.empty())
-    throw Failure(kUsage, "calibrate needs --log or, in its place, --from");
-  if (options.rows &&
-      (options.judge || options.json || options.keep_base || !(options.out + options.report + options.from).empty()))
-    throw Failure(kUsage, "--rows fits nothing: give it with --vehicle, --base-model, --map and --log alone");
+  if (options.files.logs.empty()) throw Failure(kUsage, "calibrate needs --log");
   if (options.judge && !(options.out.empty() && options.report.empty()))
     throw Failure(kUsage, "--judge fits nothing that --out or --report could hold; give it without them");
   check_outputs({options.out, options.report}, options.force);
 }
 
-/// Of logs, or of what was kept of them.
 Campaign campaign_of(const CalibrateOptions& options, const std::optional<Vehicle>& vehicle, const Model& gates) {
   Campaign campaign = empty_campaign(options.files);
-  const CalibrateRowsOf made{options.vehicle, options.base_model, options.files.maps};
   std::vector<CalibratedLog> logs;
-  if (!options.from.empty()) logs = read_calibrate_rows(options.from, made);
-  read_logs(options.files, campaign.maps, vehicle, gates, [&](CalibratedLog&& log) {
-    if (!options.rows) return logs.push_back(std::move(log));
-    const auto row = calibrate_row(log, made);
-    std::fputs(row.c_str(), stdout);
-  });
-  if (!options.rows) add_logs(campaign, std::move(logs), options.seed);
+  read_logs(options.files, campaign.maps, vehicle, gates, [&](CalibratedLog&& log) { logs.push_back(std::move(log)); });
+  add_logs(campaign, std::move(logs), options.seed);
   return campaign;
 }
 
@@ -175,7 +163,6 @@ int run(const CalibrateOptions& options) {
   auto gates = read_model(options.base_model);
   if (vehicle) gates.ground.r0 = vehicle->body.diagonal_radius;
   const auto campaign = campaign_of(options, vehicle, gates);
-  if (options.rows) return kOk;
   Json json = to_json(campaign, options);
   if (options.judge) return judge(campaign, gates, options, std::move(json));
   const auto refused = refusals(campaign.data, gates);
@@ -219,9 +206,6 @@ Verb calibrate_verb(Command& app) {
   auto& command =
       app.add_subcommand("calibrate", "Model file from hover flights: a bound at a quantile, with intervals");
   add_campaign_options(command, options->files);
-  command.add_flag("--rows", options->rows,
-                   "prints what a calibration keeps of each log as a line of JSON, and nothing else");
-  command.add_option("--from", options->from, "such lines, in order, in place of logs").type_name("FILE");
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME: gains, delays, r0");
   command.add_option("--base-model", options->base_model, "model whose gates and kappa are kept").capture_default_str();
   command.add_option("--quantile", options->quantile, "share of windows that the bound shall hold")

@@ -8,7 +8,6 @@
 #include "core/study/inference/rotor_reference.hpp"
 #include "services/backwash/calibrate_input.hpp"
 #include "services/backwash/files.hpp"
-#include "services/backwash/study_anytime.hpp"
 #include "services/backwash/study_design.hpp"
 #include "services/backwash/study_flights.hpp"
 #include "services/backwash/study_output.hpp"
@@ -26,26 +25,9 @@ struct StudyOptions {
   std::vector<std::string> logs, reference;
   std::string group, from;
   unsigned seed = 1;
-  std::vector<std::string> fleet;
   DesignOptions design;
-  bool json = false, force = false, quick = false, rules = false, residuals = false, anytime = false, rows = false;
+  bool json = false, force = false, quick = false, rules = false, residuals = false, rows = false;
 };
-
-/// The evidence after every flight, in the order of the logs, what the model holds taken out.
-std::optional<AnytimeReport> look_every_time(const StudyOptions& options, const Flights& flights,
-                                             const LookedWith& with, const std::optional<study::SoundRotors>& sound) {
-  if (!options.anytime) return std::nullopt;
-  const auto terms = read_terms(options.model);
-  study::Observer observer(with.vehicle, with.surroundings);
-  study::Anytime anytime(sound);
-  for (const auto& one : flights.observed) {
-    observer.add(one);
-    auto seen = observer.so_far();
-    study::apply(terms, seen);
-    anytime.look(seen);
-  }
-  return anytime_report(flights.paths, anytime, options.fleet);
-}
 
 /// What the simulation says of the flights with the model's own terms, and with those of the causes beside them.
 std::string residuals(const StudyOptions& options, const Flights& flights, const Vehicle& vehicle, const Model& model,
@@ -113,7 +95,7 @@ void check_rows(const StudyOptions& options) {
     if (given) throw Failure(kUsage, option + " " + why);
   };
   const std::string alone = "studies nothing: give it with --vehicle, --map, --model, --group and --log alone";
-  not_with(options.rows && (options.json || options.anytime || options.residuals || !options.reference.empty() ||
+  not_with(options.rows && (options.json || options.residuals || !options.reference.empty() ||
                             !(options.out + options.report + options.from + options.design.points).empty()),
            "--rows", alone);
   not_with(!options.from.empty() && !options.logs.empty(), "--from", "takes the place of --log: give one of them");
@@ -126,13 +108,7 @@ void check(const StudyOptions& options) {
   check_rows(options);
   if (options.residuals && (options.map.empty() || options.report.empty()))
     throw Failure(kUsage, "--residuals needs --map, to fly in, and --report, to draw on");
-  if (options.anytime && !options.group.empty())
-    throw Failure(kUsage, "--anytime takes flights one by one, in the order of --log: give it without --group");
-  if (!options.fleet.empty() && !options.anytime) throw Failure(kUsage, "--fleet needs --anytime");
-  if (!options.reference.empty()) {
-    refuse_other_numbers(options.logs);
-    refuse_other_numbers(options.reference);
-  }
+  if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
   check_design(options.design, options.map, options.force);
   check_outputs({options.report, options.out, options.design.points}, options.force);
 }
@@ -169,11 +145,9 @@ std::optional<study::Consequence> what_it_costs(const study::StudyResult& result
   return study::consequence(result, seen, model, vehicle, grid, run_shown);
 }
 
-void print_beside(const Flights& flights, const std::optional<AnytimeReport>& anytime,
-                  const std::optional<study::Design>& design, const DesignOptions& asked) {
+void print_beside(const Flights& flights, const std::optional<study::Design>& design, const DesignOptions& asked) {
   for (const auto& [log, known] : flights.twice)
     std::printf("counted once: %s is %s again\n", log.c_str(), known.c_str());
-  if (anytime) print_text(*anytime);
   if (design) print_text(*design, asked);
 }
 
@@ -225,7 +199,6 @@ int run(const StudyOptions& options) {
   Flights flights = read_flights(options, with);
   const auto sound = sound_flights(options, vehicle, model);
   auto chosen = study_options(options, sound);
-  const auto anytime = look_every_time(options, flights, with, chosen.sound);
   auto seen = observations(flights, with);
   const auto measured = options.residuals ? seen : study::Observations{};  // nothing that the model holds taken out
   auto terms = study::apply(read_terms(options.model), seen);
@@ -234,7 +207,6 @@ int run(const StudyOptions& options) {
   const auto names = flights.names();
   Json json = services::to_json(result, seen, vehicle, names);
   add_left_out(json, terms.left, flights);
-  if (anytime) json["anytime"] = services::to_json(*anytime);
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};
   const auto height = height_effects(options, model, seen);
   if (height) json["height_effect"] = services::to_json(*height);
@@ -250,7 +222,6 @@ int run(const StudyOptions& options) {
   }
   if (!options.report.empty()) {
     std::string beside = design ? html(*design, options.design) : "";
-    if (anytime) beside += html(*anytime);
     if (options.residuals)
       beside += residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen));
     write_page(
@@ -258,7 +229,7 @@ int run(const StudyOptions& options) {
         {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, vehicle, names});
   }
   options.json ? print(json) : services::print_text(result, seen, vehicle, names, consequence, rotors, height);
-  if (!options.json) print_beside(flights, anytime, design, options.design);
+  if (!options.json) print_beside(flights, design, options.design);
   return kOk;
 }
 
@@ -282,10 +253,6 @@ Verb study_verb(Command& app) {
       "theirs, as one condition");
   command.add_option("--group", options->group,
                      "column, such as day: flights with one value of it are left out, flipped and scattered together");
-  command.add_flag("--anytime", options->anytime,
-                   "evidence that may be looked at after every flight, in the order of --log");
-  command.add_option("--fleet", options->fleet,
-                     "what --anytime --json printed for other vehicles: the evidence of all together");
   command.add_option("--report", options->report, "HTML page to write");
   command.add_flag("--residuals", options->residuals,
                    "on the page, per channel: what the simulation of these flights says and what was measured");

@@ -5,15 +5,23 @@
 #include <stdexcept>
 
 #include "core/files/base64.hpp"
+#include "core/files/read_file.hpp"
 #include "core/study/windows/observed.hpp"
 #include "services/backwash/json.hpp"
-#include "services/backwash/sealed_row.hpp"
 #include "services/backwash/sha256.hpp"
 #include "services/backwash/verb.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
 namespace {
+
+constexpr std::size_t kLargestRows = std::size_t{16} << 30;
+constexpr const char* kVerb = "backwash study --rows";
+
+/// What stands for a file in a row: its SHA-256; the name of what is built in; empty for none.
+std::string file_identity(const std::string& path) {
+  return path.empty() || path.starts_with("builtin:") ? path : sha256_of_file(path);
+}
 
 Json made_with(const RowsOf& of) {
   return {{"version", kVersion},
@@ -46,13 +54,38 @@ std::string study_row(const StudiedFlight& flight, const RowsOf& of) {
   row["group"] = flight.group;
   row["positions"] = files::base64(bytes_of(flight.mark.positions()));
   row["windows"] = files::base64(study::packed(flight.observed));
-  return sealed(row);
+  try {
+    return row.dump() + "\n";
+  } catch (const Json::type_error&) {
+    throw Failure(kBadData, flight.path + ":1: its name is no UTF-8; give it another");
+  }
 }
 
 std::vector<StudiedFlight> read_study_rows(const std::string& path, const RowsOf& of) {
   std::vector<StudiedFlight> flights;
-  read_sealed(path, "backwash study --rows", made_with(of),
-              [&](const Json& row) { flights.push_back(flight_of(row)); });
+  const Json made = made_with(of);
+  std::size_t number = 0;
+  const auto take = [&](std::string_view line) {
+    const auto refuse = [&](const std::string& what) {
+      throw Failure(kBadData, path + ":" + std::to_string(number) + ": " + what + "; make it again with " + kVerb);
+    };
+    ++number;
+    const auto row = Json::parse(line, nullptr, false);
+    if (!row.is_object() || !row.contains("made")) refuse("is no line of it, or is cut short");
+    for (const auto& [name, value] : made.items())
+      if (const auto was = row["made"].value(name, Json()); was != value)
+        refuse("was made with another " + name + ": " + was.dump() + ", here it is " + value.dump());
+    try {
+      flights.push_back(flight_of(row));
+    } catch (const std::out_of_range&) {
+      refuse("is no line of it");
+    } catch (const Json::exception&) {
+      refuse("is no line of it");
+    }
+  };
+  const auto read = files::each_line(path, kLargestRows, std::string("a file of what ") + kVerb + " printed", take);
+  if (!read) throw Failure(kNoInput, path + ":1: " + read.error().message);
+  if (number == 0) throw Failure(kBadData, path + ":1: is empty; fill it with " + kVerb);
   return flights;
 }
 

@@ -18,8 +18,8 @@ struct RowsOf {
 /// The line of one log, with its newline.
 std::string study_row(const StudiedFlight& flight, const RowsOf& of);
 
-/// Reads such lines. Throws Failure: 66, or 65 with file and line for what is no such line, was changed, or was made
-/// with another program, vehicle, model, map or group.
+/// Reads such lines. Throws Failure: 66, or 65 with file and line for what is no such line, or was made with
+/// another program, vehicle, model, map or group.
 std::vector<StudiedFlight> read_study_rows(const std::string& path, const RowsOf& of);
 
 }  // namespace backwash::services

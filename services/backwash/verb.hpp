@@ -35,7 +35,6 @@ Verb reach_verb(Command& app);
 Verb plan_verb(Command& app);
 Verb simulate_verb(Command& app);
 Verb feasibility_verb(Command& app);
-Verb compare_verb(Command& app);
 Verb report_verb(Command& app);
 Verb calibrate_verb(Command& app);
 Verb import_verb(Command& app);

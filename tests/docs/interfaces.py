@@ -94,7 +94,9 @@ def names_of_status(root: pathlib.Path) -> set[str]:
 def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> None:
     # Every name that the programs write is somewhere in the page; every name in a JSON table is written somewhere.
     named = {part for q in quoted(text) for part in re.findall(r"[A-Za-z_]\w*", q)}
-    files = list((root / "services/backwash").glob("*.cpp")) + [root / "services/backwashctl" / name for name in ("status_output.cpp", "verbs.cpp")]
+    files = [*(root / "services/backwash").glob("*.cpp"),
+             *(root / name for name in ("research/compare/compare_output.cpp", "research/compare/compare_rows.cpp",
+                                        "services/backwashctl/status_output.cpp", "services/backwashctl/verbs.cpp"))]
     not_output = {"flight_spec.cpp", "import.cpp", "main.cpp", "story_page.cpp"}
     written = set()
     for file in files:
@@ -105,7 +107,7 @@ def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> No
             wrong.extend(f"JSON of {file.name}: not documented: {x}"
                          for x in sorted(names_of_json(code) - input_names - named))
     written |= names_of_status(root)
-    for measures in (root / "core/sim").glob("compare*.cpp"):  # names of Measure
+    for measures in (root / "research/compare").glob("compare*.cpp"):  # names of Measure
         written |= set(re.findall(r'"([a-z]\w*)"', measures.read_text()))
     for heading, section in sections_of.items():
         tables = re.split(r"\n\n", section)

@@ -4,7 +4,7 @@
 
 includes.py SOURCE_DIR
 
-A source file below core, services or firmware_bridge that no folder of the table holds belongs to no layer, and fails. So does
+A source file below core, services, research or firmware_bridge that no folder of the table holds belongs to no layer, and fails. So does
 a folder of the table that is not there, or one that the table lets include a folder above it. Included is by the path from the
 project's root: a path from the file's own folder would hide where it leads. Either bracket counts. Comments, continued lines and
 digraphs hide nothing, and an include that is no literal, an absolute path or an import of a module is refused as not to be read.
@@ -54,9 +54,10 @@ MAY = {
                        "services/parallel", "services/command_line"],
     "services/backwash": ["core", "firmware_bridge/autopilots", "services/security", "services/maps", "services/parallel", "services/command_line"],
     "services/package": ["core/config", *FLIGHT],  # the library's example
+    "research": ["core", "services/backwash"],
 }
 # The worlds with hidden effects share no code with what looks for them. These ask the study, and no world includes them.
-ASKS_THE_STUDY = {"anytime_main", "design_main", "design_trial", "matrix", "null_size", "observe", "oracle", "score", "shares", "shares_main", "simulation",
+ASKS_THE_STUDY = {"design_main", "design_trial", "matrix", "null_size", "observe", "oracle", "score", "shares", "shares_main", "simulation",
                   "simulation_main", "summary", "weights"}
 # DDS with what idl/ generates, MAVLink, GPIO and sockets, systemd, threads with all that only threads need; core/sync has <atomic>.
 FORBIDDEN = re.compile(r"(\w+/)*(dds|gpio|systemd|mavlink|c?thread|pthread|jthread|s?mutex|shared_mutex|future|condition_variable|"
@@ -135,7 +136,7 @@ def file_errors(root: pathlib.Path, path: pathlib.Path) -> list[str]:
 def main() -> int:
     root = pathlib.Path(sys.argv[1]).resolve()
     wrong, seen = table_errors(root), 0
-    for top in ("core", "firmware_bridge", "services"):
+    for top in ("core", "firmware_bridge", "services", "research"):
         for path in sorted(p for p in (root / top).rglob("*") if p.suffix in SOURCES):
             if not folder_of(path.relative_to(root).as_posix()):
                 wrong.append(f"{path.relative_to(root)}: belongs to no layer")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of docs/measurements/compare.md from the JSON of `backwash compare`. usage: compare_table.py FILE"""
+"""The tables of research/compare/README.md from the JSON of `backwash compare`. usage: compare_table.py FILE"""
 import json
 import sys
 

@@ -9,7 +9,7 @@
 
 #include "core/field/disturbance_field.hpp"
 #include "core/plan/planner.hpp"
-#include "core/sim/compare.hpp"
+#include "research/compare/compare.hpp"
 
 // What is raced: vehicles with their loops, maps, pairs of hover points, ways of keeping clear, and calibrated worlds.
 namespace backwash::race {

@@ -73,15 +73,6 @@ int observe_further(const HiddenWorld& world, const std::vector<Table>& first, c
   return most + 1;
 }
 
-void observe_each(const HiddenWorld& world, const std::filesystem::path& folder,
-                  const std::function<void(const study::Observations&)>& look) {
-  const auto observer = observer_of(world, folder);
-  for (const Table& table : fly_all(world)) {
-    observer->add(log_of(table));
-    look(observer->so_far());
-  }
-}
-
 study::SoundRotors sound_rotors(const HiddenWorld& world, const std::filesystem::path& folder) {
   // Worlds of one seed mostly have one craft. An empty room is drawn from fewer numbers, and the craft after it is
   // another one: with the motors' commands of one and the thrust curve of the other sound rotors look damaged.

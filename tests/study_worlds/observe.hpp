@@ -21,9 +21,6 @@ int observe_further(const HiddenWorld& world, const std::vector<Table>& first, c
                     int most, const std::function<Table(int)>& flight,
                     const std::function<bool(const backwash::study::Observations&)>& look);
 
-/// The same after every flight.
-void observe_each(const HiddenWorld& world, const std::filesystem::path& folder,
-                  const std::function<void(const backwash::study::Observations&)>& look);
 /// What six sound flights of the world's craft say of its rotors.
 backwash::study::SoundRotors sound_rotors(const HiddenWorld& world, const std::filesystem::path& folder);
 /// Of a study that is given these.

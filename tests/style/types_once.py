@@ -35,7 +35,7 @@ def types_of(code: str):
 def main() -> int:
     root = pathlib.Path(sys.argv[1])
     files: dict[str, list[str]] = {}
-    for folder in ("core", "firmware_bridge", "services"):
+    for folder in ("core", "firmware_bridge", "services", "research"):
         for path in sorted((root / folder).rglob("*.[ch]pp")):
             for name in types_of(path.read_text()):
                 files.setdefault(name, []).append(str(path.relative_to(root)))

@@ -14,14 +14,10 @@ if [[ ${2:-} != inside ]]; then
 fi
 ip address add 10.99.0.1/32 dev lo
 source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
-rows=$here/campaign_rows.py
-plan() { # plan NAME SECONDS: eight shards of one row each, which take so long
-  cp "$rows" rows.py
-  printf 'kind = "program"\nseconds = 60\nshard_seconds = 60\n[program]\ncommand = ["./rows.py", "{seed}", "a", "%s"]\ncount = 8\n' "$2" >"$1.toml"
-  "$backwash" campaign plan "$1.toml" -o "$1" >/dev/null
-}
-for seed in 1 2 3 4 5 6 7 8; do "$rows" $seed a; done >alone.jsonl
-done_of() { "$backwash" campaign status "$1" --json | python3 -c 'import json, sys; print(len(json.load(sys.stdin)["done"]))'; }
+cp "$here/campaign_rows.py" rows.py
+commands() { for seed in 1 2 3 4 5 6 7 8; do echo "./rows.py $seed a $2"; done >"$1.txt"; } # commands NAME SECONDS: of each line
+for seed in 1 2 3 4 5 6 7 8; do ./rows.py $seed a; done >alone.jsonl
+done_of() { find "$1" -name 'line-*.jsonl' | wc -l; }
 # until SECONDS COMMAND…: waits for it to hold
 until_() {
   local end=$((SECONDS + $1))
@@ -29,11 +25,11 @@ until_() {
   until "$@"; do ((SECONDS < end)) || { tail -n 20 "$work"/*.log >&2 || true; die "never came true: $*"; }; sleep 0.2; done
 }
 
-plan by_parallel 0.2
-"$backwash" campaign run by_parallel 3
-"$backwash" campaign submit by_parallel --parallel -j 2 >/dev/null 2>parallel.txt || die "GNU parallel: $(cat parallel.txt)"
+commands by_parallel 0.2
+"$backwash" campaign run by_parallel.txt -o by_parallel 3
+seq 8 | parallel -j 2 "$backwash" campaign run by_parallel.txt -o by_parallel 2>parallel.txt || die "GNU parallel: $(cat parallel.txt)"
+"$backwash" campaign merge by_parallel.txt -o by_parallel >/dev/null
 cmp by_parallel/rows.jsonl alone.jsonl
-[[ $(wc -l <by_parallel/parallel.log) == 8 ]] || die "seven shards were missing: $(cat by_parallel/parallel.log)"
 
 # Everything of it lies in $work, and listens on ports of its own.
 host=$(hostname -s) port=$((20000 + $$ % 20000))
@@ -98,14 +94,15 @@ for _ in $(seq 100); do
 done
 until_ 1 up
 
-# A shard takes 3 s: two are at work, the first of them is killed; then slurmd is, and comes again.
-plan by_slurm 3
-"$backwash" campaign submit by_slurm --slurm --partition day --time 2 >submitted.txt
-grep -q '^array [0-9]* of 8 shards, merge [0-9]* after it$' submitted.txt || die "$(cat submitted.txt)"
-at_work() { "$backwash" campaign status by_slurm --json | grep -q '"running":\[[0-9]'; }
+# A line takes 3 s: two are at work, the first of them is killed; then slurmd is, and comes again.
+commands by_slurm 3
+"$backwash" campaign submit by_slurm.txt -o by_slurm --partition day --time 2 >submitted.txt
+grep -q '^array [0-9]* of 8 lines, merge [0-9]* after it$' submitted.txt || die "$(cat submitted.txt)"
+at_work() { pgrep -f "campaign run $work/by_slurm.txt .*--task [0-9]" >task.txt; }
 until_ 30 at_work
-shard=$("$backwash" campaign status by_slurm --json | python3 -c 'import json, sys; print(json.load(sys.stdin)["running"][0])')
-kill -9 "$(pgrep -f "campaign run $work/by_slurm $shard\$" | head -n 1)"
+task=$(head -n 1 task.txt)
+line=$(tr '\0' ' ' <"/proc/$task/cmdline" | sed 's/.*--task \([0-9]*\).*/\1/')
+kill -9 "$task"
 some() { [[ $(done_of by_slurm) -ge 2 ]]; }
 until_ 60 some
 kill -9 $slurmd
@@ -115,11 +112,11 @@ slurmd -D -f "$SLURM_CONF" >>slurmd.log 2>&1 &
 pids+=($!)
 idle() { [[ -z $(squeue --noheader) ]]; }
 until_ 120 idle
-[[ $(done_of by_slurm) -lt 8 && ! -e by_slurm/rows.jsonl ]] || die "the killed shard $shard was not missing"
-grep -q "shards .*$shard.* of 0-7 are missing" by_slurm/merge.log || die "the merge did not tell: $(cat by_slurm/merge.log)"
+[[ $(done_of by_slurm) -lt 8 && ! -e by_slurm/rows.jsonl ]] || die "the killed line $line was not missing"
+grep -q "lines .*$line.* are missing" by_slurm/merge.log || die "the merge did not tell: $(cat by_slurm/merge.log)"
 missing=$((8 - $(done_of by_slurm)))
-"$backwash" campaign submit by_slurm --slurm >submitted.txt
-grep -q "of $missing shards" submitted.txt || die "not only the $missing missing ones: $(cat submitted.txt)"
+"$backwash" campaign submit by_slurm.txt -o by_slurm >submitted.txt
+grep -q "of $missing lines" submitted.txt || die "not only the $missing missing ones: $(cat submitted.txt)"
 until_ 120 idle
 cmp by_slurm/rows.jsonl alone.jsonl
-echo "$missing of 8 shards were submitted again; merged, the bytes are the same"
+echo "$missing of 8 lines were submitted again; merged, the bytes are the same"

@@ -6,7 +6,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 mapfile -t verbs < <("$backwash" --help | sed -n '/^Subcommands:/,$ s/^  \([a-z]\+\) .*/\1/p')
 [[ ${#verbs[@]} -ge 13 ]] || die "only ${#verbs[@]} verbs in --help"
 verbs=("${verbs[@]/vehicle/vehicle tune}")
-verbs=("${verbs[@]/campaign/campaign plan}")
+verbs=("${verbs[@]/campaign/campaign run}")
 verbs=("${verbs[@]/keys/keys init}")
 for verb in "${verbs[@]/#map/map info}" "map convert" "vehicle print" "vehicle check" "vehicle fit"; do
   read -ra words <<<"$verb"
@@ -14,7 +14,7 @@ for verb in "${verbs[@]/#map/map info}" "map convert" "vehicle print" "vehicle c
   grep -q "^  backwash $verb " help || die "$verb --help has no example"
   # One that needs no file of the reader's works as it stands. compare's takes minutes.
   sed -n '/^Example:/,$ { /^  /p; }' help >example.sh
-  [[ $verb == compare ]] || grep -qE '[a-z0-9*]+\.(csv|bwlog|mcap|toml|bt|ulg|obj|pcd)' example.sh && continue
+  [[ $verb == compare ]] || grep -qE '[a-z0-9*]+\.(txt|csv|bwlog|mcap|toml|bt|ulg|obj|pcd)' example.sh && continue
   mkdir -p examples
   (cd examples && PATH=$(dirname "$backwash"):$PATH bash -e ../example.sh) >/dev/null || die "the example of $verb --help fails"
   examples+=("$verb")

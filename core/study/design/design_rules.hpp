@@ -21,7 +21,7 @@ struct DesignRules {
                     "derived: what no flown window tells is fitted to the new ones, at no cost"};
   Rule design_plan_deadline{
       "design_plan_deadline", 1, "s",
-      "measured: four times what 95 % of backwash compare's plans take, 247 ms (docs/measurements/compare.md)"};
+      "measured: four times what 95 % of backwash compare's plans take, 247 ms (research/compare/README.md)"};
   Rule design_jitter{"design_jitter", 0.002, "m",
                      "derived: so that no imagined window passes for a frozen or a standing one"};
   Rule design_nearer{"design_nearer", 1e-3, "m of room a m of way",

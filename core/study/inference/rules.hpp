@@ -81,14 +81,8 @@ struct Rules {
   Rule offset_difference{"offset_difference", 0.05, "m", "derived: half the spacing at which Σ is looked up"};
   Rule polish_evaluations{"polish_evaluations", 60, "evaluations", "chosen: of NLopt, in one or two dimensions"};
   Rule polish_divisor{"polish_divisor", 100, "1", "chosen: first step of NLopt over its tolerance"};
-  // At any time
-  Rule first_look{"first_look", 5, "flights", "chosen: the scatter of the first flights is that of so many"};
-  Rule prior_flights{"prior_flights", 0.1, "flights",
-                     "derived: the variance of one flight over that of effects of 3 standard errors a flight, 1/9"};
   Rule mixture_reach{"mixture_reach", 6, "standard errors", "derived: 1e-9 of a shape's estimate lies beyond"};
   Rule mixture_turns{"mixture_turns", 60, "halvings", "derived: more than a double's digits"};
-  Rule null_range{"null_range", 40, "ln of a multiplier", "derived: both ends are beyond what doubles tell apart"};
-  Rule null_turns{"null_turns", 60, "halvings", "derived: of that range, to a part in 1e16"};
   // What remains
   Rule shift_draws{"shift_draws", 1999, "draws", "derived: resolves a third of 0.05/30, which Holm asks of 30 pairs"};
   Rule enough_turns{"enough_turns", 50, "draws",
@@ -151,7 +145,7 @@ struct Rules {
   Rule told_quantile{"told_quantile", 0.95, "1", "chosen: of the hover sets, told beside the median"};
   Rule plan_deadline{
       "plan_deadline", 3, "s",
-      "measured: twelve times what 95 % of backwash compare's plans take, 247 ms (docs/measurements/compare.md)"};
+      "measured: twelve times what 95 % of backwash compare's plans take, 247 ms (research/compare/README.md)"};
   Rule least_route{"least_route", 0.3, "m", "chosen: between places that are nearer no plan is told"};
   Rule fewest_compared{"fewest_compared", 8, "windows", "chosen: in which a channel is simulated beside measured"};
   Rule picture_groups{"picture_groups", 12, "groups", "chosen: of windows, whose means a picture draws"};

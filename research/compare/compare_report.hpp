@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/report/plot.hpp"
-#include "core/sim/compare_statistics.hpp"
+#include "research/compare/compare_statistics.hpp"
 
 namespace backwash::report {
 

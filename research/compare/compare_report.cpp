@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/report/compare_report.hpp"
+#include "research/compare/compare_report.hpp"
 
 #include <sstream>
 

@@ -8,7 +8,7 @@
 #include "core/sim/flight.hpp"
 
 // The paper's Table I: the same start–goal pairs in the same air, planned with different clearances, flown in closed
-// loop against the airflow truth. docs/measurements/compare.md has the result.
+// loop against the airflow truth. README.md says what is measured and what came out.
 namespace backwash::sim {
 
 /// A way of keeping clear: the reachable sets, or a constant margin in their place.

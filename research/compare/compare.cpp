@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/sim/compare.hpp"
+#include "research/compare/compare.hpp"
 
 #include <algorithm>
 #include <limits>

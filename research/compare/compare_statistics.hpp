@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/sim/compare.hpp"
+#include "research/compare/compare.hpp"
 
 namespace backwash::sim {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "services/backwash/compare_rows.hpp"
+#include "research/compare/compare_rows.hpp"
 
 #include <algorithm>
 #include <array>

@@ -4,8 +4,8 @@
 #include <optional>
 #include <sstream>
 
-#include "core/report/compare_report.hpp"
 #include "core/report/figure_parts.hpp"
+#include "research/compare/compare_report.hpp"
 
 namespace backwash::report {
 namespace {

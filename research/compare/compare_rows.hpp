@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "core/report/compare_report.hpp"
+#include "research/compare/compare_report.hpp"
 
 namespace backwash::services {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/sim/compare_statistics.hpp"
+#include "research/compare/compare_statistics.hpp"
 
 #include <algorithm>
 #include <cassert>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "services/backwash/compare_input.hpp"
+#include "research/compare/compare_input.hpp"
 
 #include <algorithm>
 #include <filesystem>

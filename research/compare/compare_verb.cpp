@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "research/compare/compare_verb.hpp"
+
 #include <cstdio>
 #include <filesystem>
 
-#include "core/report/compare_report.hpp"
-#include "services/backwash/compare_input.hpp"
-#include "services/backwash/compare_output.hpp"
-#include "services/backwash/compare_rows.hpp"
+#include "research/compare/compare_input.hpp"
+#include "research/compare/compare_output.hpp"
+#include "research/compare/compare_report.hpp"
+#include "research/compare/compare_rows.hpp"
 #include "services/backwash/files.hpp"
-#include "services/backwash/verb.hpp"
 #include "version.hpp"
 
 namespace backwash::services {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "services/backwash/compare_output.hpp"
+#include "research/compare/compare_output.hpp"
 
 #include <cstdio>
 #include <sstream>
