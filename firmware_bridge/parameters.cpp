@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/types/angle.hpp"
 #include "core/types/formatted.hpp"
 #include "core/types/geometry.hpp"
 
@@ -150,7 +151,7 @@ double wanted(const ParameterRule& rule, const Vehicle& vehicle, double untold_d
       return vehicle.limits.a_max;
     case Ask::lean:
     case Ask::lean_or_zero:
-      return std::atan(std::numbers::sqrt2 * vehicle.limits.a_max / kGravity) * 180 / std::numbers::pi;
+      return std::atan(std::numbers::sqrt2 * vehicle.limits.a_max / kGravity) / kDegree;
     case Ask::delay:
       return untold_delay;
     case Ask::time_out:

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "core/types/air_class.hpp"
+#include "core/types/normal.hpp"
 
 namespace backwash::adapt {
 
@@ -25,7 +26,7 @@ inline constexpr double kLeastCalm = 60;
 /// A square counts so much at most, in its expectation.
 inline constexpr double kMostSquare = 16;
 /// An error lies beyond this many deviations with probability kBeyondLevel, as modelled.
-inline constexpr double kLevel = 2.5758, kBeyondLevel = 0.01;
+inline constexpr double kLevel = normal::k995, kBeyondLevel = 0.01;
 
 /// A square of the control error, per axis of W, m².
 struct ErrorSquare {

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "core/log/import_columns.hpp"
+#include "core/types/angle.hpp"
 #include "core/types/geometry.hpp"
 
 namespace backwash::log {
@@ -15,7 +16,6 @@ struct Unit {
   const char* name;
   double factor;
 };
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr Unit kTime[] = {{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
 constexpr Unit kLength[] = {{"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}};
 constexpr Unit kSpeed[] = {{"m/s", 1}, {"cm/s", 1e-2}, {"mm/s", 1e-3}};

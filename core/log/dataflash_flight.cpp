@@ -3,9 +3,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "core/log/dataflash.hpp"
+#include "core/types/angle.hpp"
 
 namespace backwash::log {
 namespace {
@@ -48,7 +48,7 @@ void attitude(const TopicLog& log, TopicLog& out) {
   TopicLog::Topic topic{"vehicle_attitude", 0, from->t_s, {}};
   for (std::size_t k = 0; k < from->t_s.size(); ++k) {
     const auto about = [&](const char* angle, const Eigen::Vector3d& axis) {
-      return Eigen::AngleAxisd(from->columns.at(angle)[k] * std::numbers::pi / 180, axis);
+      return Eigen::AngleAxisd(from->columns.at(angle)[k] * kDegree, axis);
     };
     const Eigen::Quaterniond q = about("Yaw", Eigen::Vector3d::UnitZ()) * about("Pitch", Eigen::Vector3d::UnitY()) *
                                  about("Roll", Eigen::Vector3d::UnitX());

@@ -91,9 +91,6 @@ struct TakeoffColumn {
 };
 std::optional<TakeoffColumn> takeoff_column(const World& world, const Vec3& p_W, double least_clearance);
 
-/// Vertical commands from `from` to `to` (same column), rest to rest, minimum-jerk profile within the limits.
-std::vector<Setpoint> vertical_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max);
-
 /// Clearance that a take-off tube must have (docs/model.md section 4): beside it only while its centre is below z_safe
 /// (m, W), all around from there on and where it comes to rest, m; from entry `from` on. Precondition: not empty.
 double takeoff_clearance(const World& world, const reach::ReachTube& tube, double z_safe, std::size_t from = 0,

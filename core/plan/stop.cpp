@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/types/angle.hpp"
+
 namespace backwash::plan {
 namespace {
 
@@ -14,7 +16,7 @@ Setpoint at_path_time(const std::vector<Setpoint>& commands, double sigma) {
   if (k + 1 >= commands.size()) return {commands.back().p_W, Vec3::Zero(), Vec3::Zero(), commands.back().yaw};
   const double f = sigma - static_cast<double>(k);
   const Setpoint &a = commands[k], &b = commands[k + 1];
-  const double turn = std::remainder(b.yaw - a.yaw, 2 * std::numbers::pi);
+  const double turn = wrap_angle(b.yaw - a.yaw);
   return {(1 - f) * a.p_W + f * b.p_W, (1 - f) * a.v_W + f * b.v_W, (1 - f) * a.a_W + f * b.a_W, a.yaw + f * turn};
 }
 

@@ -24,23 +24,6 @@ std::optional<TakeoffColumn> takeoff_column(const World& world, const Vec3& p_W,
   return std::nullopt;
 }
 
-std::vector<Setpoint> vertical_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max) {
-  // p(s) = 10 s³ − 15 s⁴ + 6 s⁵ has peaks 15/8 of velocity and 10/√3 of acceleration.
-  const Vec3 way = to_W - from_W;
-  const double distance = way.norm();
-  const double least = std::max(15.0 / 8 * distance / v_max, std::sqrt(10 / std::sqrt(3.0) * distance / a_max));
-  const auto periods = static_cast<std::size_t>(std::max(1.0, std::ceil(least / kControlPeriod)));
-  const double T = static_cast<double>(periods) * kControlPeriod;
-  std::vector<Setpoint> commands(periods + 1);
-  for (std::size_t k = 0; k <= periods; ++k) {
-    const double s = static_cast<double>(k) / static_cast<double>(periods);
-    commands[k].p_W = from_W + s * s * s * (10 - 15 * s + 6 * s * s) * way;
-    commands[k].v_W = 30 * s * s * (1 - s) * (1 - s) / T * way;
-    commands[k].a_W = 60 * s * (1 - s) * (1 - 2 * s) / (T * T) * way;
-  }
-  return commands;
-}
-
 double lateral_clearance(const World& world, const reach::ReachTube& tube) {
   return lateral_clearance(world.grid, world.reach.vehicle, world.constant_margin, tube);
 }

@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "core/types/angle.hpp"
 #include "core/types/geometry.hpp"
+#include "core/types/minimum_jerk.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -28,7 +29,7 @@ std::vector<Setpoint> facing_ahead(std::vector<Setpoint> commands, const YawStar
     const Vec3 ahead = commands[std::min(k + kAhead, count - 1)].p_W - commands[k].p_W;
     if (ahead.head<2>().norm() > kLeast) {
       const double heading = std::atan2(ahead.y(), ahead.x());
-      target = yaw + std::remainder(heading - yaw, 2 * std::numbers::pi);
+      target = yaw + wrap_angle(heading - yaw);
     }
     const double error = target - yaw, change = limits.acceleration * kControlPeriod;
     // Braking takes what is left of the commands, this one excluded.
@@ -43,17 +44,14 @@ std::vector<Setpoint> facing_ahead(std::vector<Setpoint> commands, const YawStar
 
 std::vector<Setpoint> turned_to(const Setpoint& at, double yaw, const YawLimits& limits) {
   constexpr double kReached = 1e-3;  // rad
-  const double angle = std::remainder(yaw - at.yaw, 2 * std::numbers::pi);
+  const double angle = wrap_angle(yaw - at.yaw);
   if (std::abs(angle) < kReached || !(limits.rate > 0 && limits.acceleration > 0)) return {};
-  // Minimum-jerk: peaks 15/8 of the mean rate, 10/√3 of angle/T² of acceleration; a tenth to spare for the steps.
-  const double T = 1.1 * std::max(15.0 / 8 * std::abs(angle) / limits.rate,
-                                  std::sqrt(10 / std::numbers::sqrt3 * std::abs(angle) / limits.acceleration));
+  constexpr double kToSpare = 1.1;  // for the steps
+  const double T = kToSpare * minimum_jerk_duration(std::abs(angle), limits.rate, limits.acceleration);
   const double steps = std::ceil(T / kControlPeriod) + 1;
   std::vector<Setpoint> commands;
-  for (double k = 1; k <= steps; ++k) {
-    const double s = k / steps;
-    commands.push_back({at.p_W, Vec3::Zero(), Vec3::Zero(), at.yaw + s * s * s * (10 - 15 * s + 6 * s * s) * angle});
-  }
+  for (double k = 1; k <= steps; ++k)
+    commands.push_back({at.p_W, Vec3::Zero(), Vec3::Zero(), at.yaw + minimum_jerk(k / steps).value * angle});
   return commands;
 }
 

@@ -11,6 +11,7 @@
 
 #include "core/reach/clearance.hpp"
 #include "core/reach/coloured_error.hpp"
+#include "core/types/normal.hpp"
 
 namespace backwash::reach {
 namespace {
@@ -22,9 +23,7 @@ struct HalfSpace {
   Vec3 n, at_W;
   double u = 0, sigma = 0;
   double level() const noexcept { return u > 0 ? u / sigma : 0.0; }
-  double outside() const noexcept {
-    return sigma > 0 ? std::erfc(u / sigma / std::numbers::sqrt2) / 2 : u > 0 ? 0.0 : 1.0;
-  }
+  double outside() const noexcept { return sigma > 0 ? normal::below(-u / sigma) : u > 0 ? 0.0 : 1.0; }
 };
 
 /// Error of one entry of a tube.

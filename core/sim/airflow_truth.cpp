@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/sim/ray.hpp"
+#include "core/types/angle.hpp"
 
 namespace backwash::sim {
 namespace {
@@ -28,7 +29,7 @@ constexpr double kFloorLift = 0.035, kFloorLiftLength = 0.4, kCeilingPull = 0.01
 
 constexpr double kDownRange = 4, kUpRange = 1.5, kSideRange = 2;
 constexpr int kSideRays = 24;
-constexpr double kSlant = 35 * std::numbers::pi / 180;  // of the four outer rays to the floor
+constexpr double kSlant = 35 * kDegree;  // of the four outer rays to the floor
 
 constexpr double kGustTime = 0.075;  // critically damped: correlation (1 + t/T) e^(−t/T), integral time 2T
 constexpr double kIntensitySigma = 0.25, kIntensityTime = 6;

@@ -72,25 +72,6 @@ void ClosedLoop::fly(const Setpoint& command) {
   for (int i = 0; i < steps; ++i) step();
 }
 
-std::vector<Setpoint> straight_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max) {
-  // s(u) = 10u³ − 15u⁴ + 6u⁵: largest ds/du = 15/8, largest d²s/du² = 10/√3.
-  const Vec3 way = to_W - from_W;
-  const double length = way.norm();
-  const double duration = std::max(1.875 * length / v_max, std::sqrt(10 / std::sqrt(3.0) * length / a_max));
-  const auto steps = static_cast<std::size_t>(std::ceil(duration / kControlPeriod));
-  std::vector<Setpoint> commands;
-  for (std::size_t k = 1; k <= steps; ++k) {
-    const double T = static_cast<double>(steps) * kControlPeriod;
-    const double u = static_cast<double>(k) / static_cast<double>(steps);
-    Setpoint c;
-    c.p_W = from_W + way * (u * u * u * (10 + u * (-15 + 6 * u)));
-    c.v_W = way * (30 * u * u * (1 + u * (-2 + u)) / T);
-    c.a_W = way * (60 * u * (1 + u * (-3 + 2 * u)) / (T * T));
-    commands.push_back(c);
-  }
-  return commands;
-}
-
 std::vector<Setpoint> hold_commands(const Vec3& at_W, double seconds) {
   Setpoint hold;
   hold.p_W = at_W;

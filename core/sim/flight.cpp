@@ -8,6 +8,7 @@
 #include "core/plan/ends.hpp"
 #include "core/plan/rest.hpp"
 #include "core/reach/integrator.hpp"
+#include "core/types/minimum_jerk.hpp"
 #include "core/types/text.hpp"
 
 namespace backwash::sim {
@@ -113,7 +114,7 @@ tl::expected<TakeOff, FlightRefused> take_off(const plan::World& world, const Fl
   TakeOff rise{*column, {}, {}, 0, 0};
   rise.ground.p_W = options.start_W;
   rise.ground.p_W.z() = column->z_floor + world.reach.vehicle.body.radius;
-  rise.commands = plan::vertical_commands(rise.ground.p_W, options.start_W, options.limits.v_max, options.limits.a_max);
+  rise.commands = rest_to_rest(rise.ground.p_W, options.start_W, options.limits.v_max, options.limits.a_max);
   rise.risen = rise.commands.size();
   append(rise.commands, hold_commands(options.start_W, options.settle_s));
   plan::hold_until_settled(world.reach, rise.commands);

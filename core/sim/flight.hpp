@@ -71,10 +71,7 @@ class ClosedLoop {
   std::optional<double> temperature_;
 };
 
-/// Commands every 20 ms on the straight line between two points, rest to rest with a minimum-jerk profile within the
-/// limits (m/s and m/s² along the line), the last one at `to`.
-std::vector<Setpoint> straight_commands(const Vec3& from_W, const Vec3& to_W, double v_max, double a_max);
-/// The same command `seconds` long.
+/// One command, `seconds` long.
 std::vector<Setpoint> hold_commands(const Vec3& at_W, double seconds);
 
 /// Columns of docs/interfaces.md, "Flight log, CSV"; position, velocity and attitude as estimated on board. `rotors`:

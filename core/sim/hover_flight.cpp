@@ -4,6 +4,8 @@
 #include <cmath>
 #include <random>
 
+#include "core/types/minimum_jerk.hpp"
+
 namespace backwash::sim {
 
 std::vector<HoverFlight::Hover> hover_points(const HoverGrid& grid, std::uint64_t seed) {
@@ -35,7 +37,7 @@ std::vector<FlightSample> fly_hovers(const map::OccupancyGrid& grid, const Vehic
   simulation.strength = std::exp(flight.strength_sd * normal(random));
   ClosedLoop loop(grid, vehicle, {flight.start_W, Vec3::Zero()}, flight.seed, simulation);
   std::vector<FlightSample> samples;
-  const auto follow = [&](const std::vector<Setpoint>& commands, std::optional<int> segment) {
+  const auto follow = [&](std::span<const Setpoint> commands, std::optional<int> segment) {
     for (const auto& command : commands) {
       samples.push_back(loop.sample(command, segment));
       loop.fly(command);
@@ -44,8 +46,8 @@ std::vector<FlightSample> fly_hovers(const map::OccupancyGrid& grid, const Vehic
   Vec3 at = flight.start_W;
   int number = 0;
   for (const auto& hover : flight.hovers) {
-    if ((hover.p_W - at).norm() > 0)
-      follow(straight_commands(at, hover.p_W, vehicle.limits.v_max, vehicle.limits.a_max), {});
+    const auto way = rest_to_rest(at, hover.p_W, vehicle.limits.v_max, vehicle.limits.a_max);
+    if ((hover.p_W - at).norm() > 0) follow(std::span(way).subspan(1), {});
     follow(hold_commands(hover.p_W, hover.dwell_s), number++);
     at = hover.p_W;
   }

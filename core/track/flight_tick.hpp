@@ -7,6 +7,7 @@
 #include "core/track/odometry_gate.hpp"
 #include "core/track/supervisor.hpp"
 #include "core/track/tracker.hpp"
+#include "core/types/angle.hpp"
 
 namespace backwash::track {
 
@@ -90,8 +91,8 @@ class FlightTick {
  public:
   /// A loop closure that moves a flying vehicle in the map by more is not flown: drift is corrected in steps of
   /// decimetres and degrees, and the tubes of a room are narrower than this.
-  static constexpr double kMaxClosure = 1.0;                              ///< m
-  static constexpr double kMaxClosureTurn = 10 * 3.14159265358979 / 180;  ///< rad
+  static constexpr double kMaxClosure = 1.0;               ///< m
+  static constexpr double kMaxClosureTurn = 10 * kDegree;  ///< rad
   /// More samples in a row whose stamp does not rise are as no odometry at all (docs/faults.md row 5).
   static constexpr int kDisorder = 3;
   /// What the frames may come apart in flight, whatever the two estimates claim, m: one that boasts is not believed to

@@ -30,11 +30,6 @@ FrameAlignment::FrameAlignment(const OdometryTiming& timing) noexcept
       fade_(std::pow(kFade, timing.usual_samples())),
       longest_step_(kLongestStep + timing.longer_gap()) {}
 
-double wrap_angle(double angle) noexcept {
-  angle = std::remainder(angle, 2 * std::numbers::pi);
-  return angle <= -std::numbers::pi ? std::numbers::pi : angle;
-}
-
 Vec3 FrameAlignment::rotate(const Vec3& v) const noexcept { return RigidShift{yaw_, Vec3::Zero()}.rotate(v); }
 
 void FrameAlignment::update(const FramePose& in_map, const FramePose& in_local, double dt, bool learn) noexcept {

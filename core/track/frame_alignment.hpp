@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/track/rebase.hpp"
+#include "core/types/angle.hpp"
 #include "core/types/mode.hpp"
 #include "core/types/odometry_timing.hpp"
 #include "core/types/state.hpp"
@@ -25,18 +26,18 @@ struct FramePose {
 /// frozen, it only watches how well they still agree.
 class FrameAlignment {
  public:
-  static constexpr double kMaxPosition = 0.05;                     ///< m: aligned below this residual
-  static constexpr double kMaxYaw = 3.0 * 3.14159265358979 / 180;  ///< rad
-  static constexpr int kMinSamples = 25;                           ///< half a second at 50 Hz
+  static constexpr double kMaxPosition = 0.05;      ///< m: aligned below this residual
+  static constexpr double kMaxYaw = 3.0 * kDegree;  ///< rad
+  static constexpr int kMinSamples = 25;            ///< half a second at 50 Hz
   /// A single pair further apart than three times the above is no noise.
   static constexpr double kResetPosition = 3 * kMaxPosition, kResetYaw = 3 * kMaxYaw;
-  static constexpr double kMaxTilt = 5.0 * 3.14159265358979 / 180;  ///< rad
+  static constexpr double kMaxTilt = 5.0 * kDegree;  ///< rad
   /// Turn of the odometry beyond the gyros', rad, fading over kTurnOver: 1 rad/s and 50 ms between the two, or a drift
   /// of 0.8°/s.
-  static constexpr double kMaxGyroTurn = 4.0 * 3.14159265358979 / 180, kTurnOver = 5.0;
-  static constexpr double kMaxTurn = 10.0 * 3.14159265358979 / 180;  ///< rad, between the velocities' directions
-  static constexpr double kExcited = 25 * 0.15 * 0.15;               ///< (m/s)²: half a second at 0.15 m/s
-  static constexpr double kLeastGain = 0.5, kLeastRotation = 0.8;    ///< of velocity, both 1 in a perfect match
+  static constexpr double kMaxGyroTurn = 4.0 * kDegree, kTurnOver = 5.0;
+  static constexpr double kMaxTurn = 10.0 * kDegree;               ///< rad, between the velocities' directions
+  static constexpr double kExcited = 25 * 0.15 * 0.15;             ///< (m/s)²: half a second at 0.15 m/s
+  static constexpr double kLeastGain = 0.5, kLeastRotation = 0.8;  ///< of velocity, both 1 in a perfect match
 
   /// Of slower odometry each pair counts for as many as would have come at OdometryTiming::kUsual.
   explicit FrameAlignment(const OdometryTiming& timing = {}) noexcept;
@@ -89,8 +90,5 @@ class FrameAlignment {
   double map_yaw_ = 0;           ///< of the last pair
   FramePose local_;              ///< of the last pair
 };
-
-/// Angle wrapped to (−π, π], rad.
-double wrap_angle(double angle) noexcept;
 
 }  // namespace backwash::track

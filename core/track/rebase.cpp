@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/track/frame_alignment.hpp"
+#include "core/types/minimum_jerk.hpp"
 
 namespace backwash::track {
 namespace {
@@ -16,7 +17,8 @@ struct Share {
 Share share_left(double s) noexcept {
   if (s <= 0) return {};
   if (s >= 1) return {0, 0, 0};
-  return {1 - s * s * s * (10 - 15 * s + 6 * s * s), -30 * s * s * (1 - s) * (1 - s), -60 * s * (1 - s) * (1 - 2 * s)};
+  const auto [value, first, second] = minimum_jerk(s);
+  return {1 - value, -first, -second};
 }
 
 Setpoint blended(const Setpoint& c, const RigidShift& D, const Share& beta, double rate) noexcept {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/types/angle.hpp"
 #include "core/types/geometry.hpp"
 
 // The one place of NED and FRD. Elsewhere the world is z-up (x east, y north when it is aligned with the earth) and the
@@ -27,7 +28,7 @@ inline Eigen::Quaterniond swap_ned_frd(const Eigen::Quaterniond& q) noexcept {
   return r.w() < 0 ? Eigen::Quaterniond(-r.w(), -r.x(), -r.y(), -r.z()) : r;
 }
 
-/// Heading, counter-clockwise from world x (east) ↔ clockwise from north: ψ ↦ π/2 − ψ, wrapped to [−π, π], rad.
-inline double swap_yaw(double yaw) noexcept { return std::remainder(std::numbers::pi / 2 - yaw, 2 * std::numbers::pi); }
+/// Heading, counter-clockwise from world x (east) ↔ clockwise from north: ψ ↦ π/2 − ψ, wrapped to (−π, π], rad.
+inline double swap_yaw(double yaw) noexcept { return wrap_angle(std::numbers::pi / 2 - yaw); }
 
 }  // namespace backwash::mavlink

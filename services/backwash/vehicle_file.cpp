@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/config/builtin_files.hpp"
+#include "core/types/angle.hpp"
 #include "core/types/geometry.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
@@ -75,7 +76,7 @@ int check_file(const VehicleFileOptions& options) {
   std::printf("%-22s %s\n", "vehicle", v.name.c_str());
   std::printf("%-22s %.2f; hovers at a thrust command of %.2f\n", "thrust over weight", thrust,
               json["hover_command"].get<double>());
-  std::printf("%-22s %.0f degrees at limits.a_max along x and y\n", "lean", lean * 180 / std::numbers::pi);
+  std::printf("%-22s %.0f degrees at limits.a_max along x and y\n", "lean", lean / kDegree);
   std::printf("%-22s k_p %.3g, k_d %.3g, damping %.2f; vertical %.3g, %.3g, %.2f\n", "loop", kp.horizontal,
               kd.horizontal, along, kp.vertical, kd.vertical, up);
   std::printf("%-22s %.3f m for each m/s² of disturbance; vertical %.3f m\n", "hover set, half width",

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
+#include "core/types/angle.hpp"
 #include "services/backwashd/text.hpp"
 
 namespace backwash::daemon {
@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kUnit = 1e-2;  // of a quaternion's norm
 // What no map and no vehicle indoors reaches. A float, as it goes on the wire, resolves 1 mm at 10 km.
-constexpr double kFarthest = 10'000, kFastest = 100;       // m, m/s
-constexpr double kMaxTilt = 1.0 * 3.14159265358979 / 180;  // rad
+constexpr double kFarthest = 10'000, kFastest = 100;  // m, m/s
+constexpr double kMaxTilt = 1.0 * kDegree;            // rad
 
 // Written so that what is no number is not within.
 bool within(const Vec3& v, double most) { return v.norm() <= most; }
@@ -152,7 +152,7 @@ void Localization::settle() {
 /// By how much a transform moves the vehicle, and what is a metre away from it: obstacles beyond count for nothing.
 double Localization::step_to(const track::RigidShift& newest) const {
   const track::RigidShift step = map_from_odom_->inverse() * newest;
-  return (step.point(*p_O_) - *p_O_).norm() + std::abs(std::remainder(step.yaw, 2 * std::numbers::pi)) * 1.0;
+  return (step.point(*p_O_) - *p_O_).norm() + std::abs(wrap_angle(step.yaw)) * 1.0;
 }
 
 tl::expected<void, std::string> Localization::loop_closure(const dds::TransformStamped& m) {

@@ -14,6 +14,7 @@
 #include "core/plan/ends.hpp"
 #include "core/plan/rest.hpp"
 #include "core/plan/stop.hpp"
+#include "core/types/minimum_jerk.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -115,7 +116,7 @@ std::optional<std::string> PlannerWorker::take_off(const PlanJob& job) {
 
 std::vector<Setpoint> PlannerWorker::rise(const Vec3& from, const Vec3& to) const {
   const auto& limits = world_->reach.vehicle.limits;
-  auto commands = plan::vertical_commands(from, to, limits.v_max, limits.a_max);
+  auto commands = rest_to_rest(from, to, limits.v_max, limits.a_max);
   for (Setpoint& command : commands) command.yaw = view_.command.yaw;
   return commands;
 }

@@ -5,8 +5,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
+#include "core/types/angle.hpp"
 #include "firmware_bridge/mavlink/frames.hpp"
 
 namespace backwash::bench {
@@ -121,8 +121,7 @@ void ControllerInLoop::locate(double t) {
   const auto q = mavlink::swap_ned_frd(attitude());
   const Vec3 w = mavlink::swap_frd(airframe_.rates());
   const std::int32_t lat = degrees7(kLatitude + p.x() / kMetresPerDegree);
-  const std::int32_t lon =
-      degrees7(kLongitude + p.y() / (kMetresPerDegree * std::cos(kLatitude * std::numbers::pi / 180)));
+  const std::int32_t lon = degrees7(kLongitude + p.y() / (kMetresPerDegree * std::cos(kLatitude * kDegree)));
   const auto alt = static_cast<std::int32_t>(std::lround(1000 * (kAltitude - p.z())));
   std::vector<std::uint8_t> out;
   send(mavlink::HilStateQuaternion{.time_usec = microseconds(t),

@@ -50,8 +50,7 @@ class ArduPilotTruth : public TruthSource {
       last_ = t;
     }
     const double north = (m.lat_int - first_->lat_int) * kMetresPerStep;
-    const double east =
-        (m.lon_int - first_->lon_int) * kMetresPerStep * std::cos(first_->lat_int * 1e-7 * 3.14159265358979 / 180);
+    const double east = (m.lon_int - first_->lon_int) * kMetresPerStep * std::cos(first_->lat_int * 1e-7 * kDegree);
     const Vec3 step(east, north, static_cast<double>(m.alt) - static_cast<double>(first_->alt));
     const double dt = static_cast<double>(t.at_ns - last_.at_ns) * 1e-9;
     const Vec3 p = last_.p_E + dt / 2 * (last_.v_E + t.v_E);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/types/minimum_jerk.hpp"
 #include "core/types/state.hpp"
 
 namespace backwash::daemon::test {
@@ -15,8 +16,8 @@ inline std::vector<Setpoint> eights(const Setpoint& from, const Vec3& home, doub
   std::vector<Setpoint> commands;
   const Vec3 way = home - from.p_W;
   for (double t = 0; t < 4; t += kControlPeriod) {
-    const double s = t / 4, v = 30 * s * s * (1 - s) * (1 - s) / 4, a = 60 * s * (1 - s) * (1 - 2 * s) / 16;
-    commands.push_back({from.p_W + s * s * s * (10 - 15 * s + 6 * s * s) * way, v * way, a * way, from.yaw});
+    const auto [s, v, a] = minimum_jerk(t / 4);
+    commands.push_back({from.p_W + s * way, v / 4 * way, a / 16 * way, from.yaw});
   }
   for (double t = 0; t < seconds; t += kControlPeriod) {
     const auto swing = [t](double amplitude, double omega) {  // from rest

@@ -13,6 +13,7 @@
 #include "core/map/load_map.hpp"
 #include "core/plan/rest.hpp"
 #include "core/sim/flight.hpp"
+#include "core/types/minimum_jerk.hpp"
 #include "firmware_bridge/mavlink/frames.hpp"
 #include "tests/daemon/lockstep_line.hpp"
 #include "tests/daemon/traps.hpp"
@@ -265,7 +266,7 @@ void Lockstep::take_off() {
 
 std::vector<Setpoint> Lockstep::rise() const {
   const auto& limits = vehicle_.limits;
-  auto commands = plan::vertical_commands(view().command.p_W, kStart, limits.v_max, limits.a_max);
+  auto commands = rest_to_rest(view().command.p_W, kStart, limits.v_max, limits.a_max);
   plan::hold_until_settled(world_->reach, commands);
   for (auto& c : commands) c.yaw = view().command.yaw;
   return commands;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "core/plan/planner.hpp"
+#include "core/types/minimum_jerk.hpp"
 #include "tests/plan/drawn.hpp"
 
 namespace backwash::plan {
@@ -240,7 +241,7 @@ TEST(TakeoffColumn, FindsTheFloorAndTheLowestClearHover) {
 TEST(VerticalCommands, RestToRestWithinTheLimits) {
   const Vec3 from(1, 2, 0.1), to(1, 2, 1.3);
   for (const double v_max : {0.2, 5.0}) {
-    const auto commands = vertical_commands(from, to, v_max, 1.0);
+    const auto commands = rest_to_rest(from, to, v_max, 1.0);
     EXPECT_EQ(commands.front().p_W, from);
     EXPECT_LT((commands.back().p_W - to).norm(), 1e-12);
     EXPECT_LT(commands.back().v_W.norm() + commands.back().a_W.norm() + commands.front().a_W.norm(), 1e-12);

@@ -12,6 +12,7 @@
 #include "core/plan/stop.hpp"
 #include "core/plan/verified_stops.hpp"
 #include "core/reach/rest.hpp"
+#include "core/types/minimum_jerk.hpp"
 #include "tests/plan/drawn.hpp"
 
 namespace backwash::plan {
@@ -56,7 +57,7 @@ void draw_flights(const World& world, std::mt19937& random, const Each& each) {
     const Vec3 from = Vec3(2.5, 2.5, 1.2) + random_vector(random, 1).cwiseProduct(Vec3(2, 2, 0.6));
     Vec3 way = random_vector(random, 1).cwiseProduct(Vec3(1, 1, 0.2));
     way = 2 * way.normalized();
-    std::vector<Setpoint> commands = vertical_commands(from, from + way, 1.0, 2.0);
+    std::vector<Setpoint> commands = rest_to_rest(from, from + way, 1.0, 2.0);
     if (may_rest_at(world, from, 0)) each(commands);
   }
 }

@@ -10,6 +10,8 @@
 #include <random>
 #include <sstream>
 
+#include "core/types/minimum_jerk.hpp"
+
 namespace backwash::race {
 namespace {
 
@@ -61,11 +63,8 @@ Trajectory sampled(const std::vector<Piece>& pieces) {
 
 /// Along a curve of the given length, s in m, rest to rest with a minimum-jerk profile.
 Trajectory along(const std::string& by, double length, double v_max, const std::function<Vec3(double)>& curve) {
-  const double duration = std::max(1.875 * length / v_max, std::sqrt(10 / std::sqrt(3.0) * length / 2));
-  const auto at = [&](double t) {
-    const double u = std::clamp(t / duration, 0.0, 1.0);
-    return curve(length * u * u * u * (10 + u * (-15 + 6 * u)));
-  };
+  const double duration = minimum_jerk_duration(length, v_max, 2);
+  const auto at = [&](double t) { return curve(length * minimum_jerk(std::clamp(t / duration, 0.0, 1.0)).value); };
   constexpr double d = 1e-3;
   Trajectory result{by, "places", v_max, {}};
   for (double t = kControlPeriod; t < duration + kControlPeriod; t += kControlPeriod) {

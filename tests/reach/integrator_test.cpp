@@ -13,6 +13,7 @@
 #include "core/reach/chance.hpp"
 #include "core/reach/hover_set.hpp"
 #include "core/reach/reach_tube.hpp"
+#include "core/types/minimum_jerk.hpp"
 #include "tests/reach/charged_loop.hpp"
 
 namespace backwash::reach {
@@ -269,11 +270,11 @@ TEST(Integrator, FlightsStayInTheirTubeWhileThePushComesAndGoes) {
   const Reachability reach(vehicle);
   std::vector<Setpoint> commands;  // 2 m in 4 s and back to rest, within 1 m/s²
   for (int k = 0; k < 400; ++k) {
-    const double t = std::min(0.02 * k, 4.0), s = t / 4, rate = 1.0 / 4;
+    const auto [s, v, a] = minimum_jerk(std::min(0.02 * k, 4.0) / 4);
     Setpoint c;
-    c.p_W.x() = -1 + 2 * s * s * s * (10 - 15 * s + 6 * s * s);
-    c.v_W.x() = 2 * rate * 30 * s * s * (1 - s) * (1 - s);
-    c.a_W.x() = 2 * rate * rate * 60 * s * (1 - s) * (1 - 2 * s);
+    c.p_W.x() = -1 + 2 * s;
+    c.v_W.x() = 2 * v / 4;
+    c.a_W.x() = 2 * a / 16;
     commands.push_back(c);
   }
   State start;

@@ -10,6 +10,7 @@
 #include "core/plan/world.hpp"
 #include "core/reach/chance.hpp"
 #include "core/sim/quadrotor.hpp"
+#include "core/types/minimum_jerk.hpp"
 
 namespace backwash {
 namespace {
@@ -63,7 +64,7 @@ std::vector<State> flown(const State& start, const std::vector<Setpoint>& comman
 }
 
 std::vector<Setpoint> way(const Vec3& from, const Vec3& to) {
-  auto commands = plan::vertical_commands(from, to, 1, 2);
+  auto commands = rest_to_rest(from, to, 1, 2);
   commands.insert(commands.end(), 150, Setpoint{to});
   return commands;
 }

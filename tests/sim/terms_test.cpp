@@ -7,6 +7,7 @@
 
 #include "core/config/config.hpp"
 #include "core/sim/setpoint_flight.hpp"
+#include "core/types/minimum_jerk.hpp"
 #include "tests/sim/five_inch.hpp"
 
 namespace backwash::sim {
@@ -262,7 +263,7 @@ TEST(SetpointFlight, HasTheLogsStampsAndFollowsItsSetPoints) {
   auto vehicle = five_inch();
   vehicle.estimation.position = 0;
   ModelField field(grid, config::load_model("builtin:quad-5in").value());
-  const auto commands = straight_commands({1, 1, 1}, {3, 2, 1.5}, 1.0, 1.0);
+  const auto commands = rest_to_rest({1, 1, 1}, {3, 2, 1.5}, 1.0, 1.0);
   log::FlightLog log;
   double t = 5;
   for (std::size_t k = 0; k < commands.size(); ++k) {

@@ -11,6 +11,7 @@
 #include "core/config/config.hpp"
 #include "core/sim/flight.hpp"
 #include "core/sim/quadrotor.hpp"
+#include "core/types/minimum_jerk.hpp"
 
 namespace backwash::study {
 namespace {
@@ -36,7 +37,8 @@ log::FlightLog flown(const Vehicle& vehicle, unsigned seed, bool hover) {
   for (int leg = 0; !hover && leg < 16; ++leg) {
     const Vec3 next =
         leg % 2 == 0 ? Vec3(0, 0, 1.2) + Vec3(normal(random), normal(random), 0.4 * normal(random)) : Vec3(0, 0, 1.2);
-    for (const auto& c : sim::straight_commands(at, next, 1.4, 2.0)) commands.push_back(c);
+    const auto way = rest_to_rest(at, next, 1.4, 2.0);
+    commands.insert(commands.end(), way.begin() + 1, way.end());
     for (const auto& c : sim::hold_commands(next, 1.0)) commands.push_back(c);
     at = next;
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Events that fall together: an order in the tick of a fault, a switch pressed where the vehicle already holds, poses
 // that are told again, a pilot who takes over before we have, loop closures in a row.
+#include "core/types/angle.hpp"
 #include "tests/track/flown.hpp"
 #include "tests/track/straight_flight.hpp"
 
@@ -108,7 +109,7 @@ TEST(LoopClosures, AddUpInFlightToWhatIsNotFlown) {
     f.closures = 1;  // the odometry came into the map by the first one
     f.step();
     for (std::uint32_t n = 1; n <= 3; ++n) {
-      (turns ? f.frame_W.yaw : f.frame_W.t.x()) += turns ? 4 * 3.14159265358979 / 180 : 0.45;
+      (turns ? f.frame_W.yaw : f.frame_W.t.x()) += turns ? 4 * kDegree : 0.45;
       ++f.closures;
       f.step();
       EXPECT_EQ(f.out.supervisor.mode, n < 3 ? Mode::tracking : Mode::hold) << n << to_string(f.out.supervisor.reason);

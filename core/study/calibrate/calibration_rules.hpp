@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/study/windows/rule.hpp"
+#include "core/types/normal.hpp"
 
 namespace backwash::study::calibrate {
 
@@ -32,7 +33,7 @@ struct CalibrationRules {
   Rule folds{"folds", 5, "1", "chosen: a fifth of the flights is held out at a time"};
   Rule push_quantile{"push_quantile", 0.95, "1", "chosen: the steady push that 19 of 20 hovers stay below"};
   Rule interval_tail{"interval_tail", 0.025, "1", "derived: an interval of 95 % leaves so much beyond each end"};
-  Rule interval_z{"interval_z", 1.959964, "1", "derived: its quantile of the normal distribution"};
+  Rule interval_z{"interval_z", normal::k975, "1", "derived: its quantile of the normal distribution"};
   Rule same_place{"same_place", 0.1, "m", "derived: a voxel: windows farther apart are another hover"};
   Rule same_window{"same_window", 2, "s", "derived: window_length, over which the noise of a mean is told"};
   // Refusals

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <nlopt.hpp>
-#include <numbers>
 
 #include "core/study/calibrate/calibration_rules.hpp"
+#include "core/types/normal.hpp"
 
 namespace backwash::study::calibrate {
 namespace {
@@ -237,7 +237,7 @@ double level_shift(const Data& data, std::span<const double> weights, const Para
   const double sd = std::max(s.between[g], kCalibrationRules.least_between.value);
   const auto covered = [&](double shift) {
     double sum = 0;
-    for (const auto& [r, weight] : within) sum += weight * 0.5 * std::erfc((r - shift) / (sd * std::numbers::sqrt2));
+    for (const auto& [r, weight] : within) sum += weight * normal::below((shift - r) / sd);
     return sum / total;
   };
   double low = -kCalibrationRules.level_range, high = kCalibrationRules.level_range;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/study/design/design_rules.hpp"
+#include "core/types/normal.hpp"
 
 namespace backwash::study {
 namespace {
@@ -54,7 +55,7 @@ double Imitation::divergence() const {
 
 double passes(double lead, double growth, double needed) {
   if (!(growth > 0)) return lead > needed ? 1 : 0;
-  return 0.5 * std::erfc((needed - lead - growth) / (2 * std::sqrt(growth)));
+  return normal::below((lead + growth - needed) / std::sqrt(2 * growth));
 }
 
 std::optional<int> Outlook::flights() const {

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "core/study/design/design_rules.hpp"
+#include "core/types/angle.hpp"
 
 namespace backwash::study {
 namespace {
@@ -73,9 +75,9 @@ class Room {
 /// The corners of a level polygon about a point.
 Points ring(const Vec3& centre, double side, int corners) {
   Points points;
-  const double radius = side / 2 / std::sin(M_PI / corners);
+  const double radius = side / 2 / std::sin(std::numbers::pi / corners);
   for (int k = 0; k < corners; ++k) {
-    const double angle = 2 * M_PI * (k + 0.5) / corners;
+    const double angle = 2 * std::numbers::pi * (k + 0.5) / corners;
     points.push_back(centre + radius * Vec3(std::cos(angle), std::sin(angle), 0));
   }
   return points;
@@ -169,7 +171,7 @@ class List {
   static std::vector<Waypoint> headings(const Points& places, int parts) {
     std::vector<Waypoint> points;
     for (int k = 1; k <= parts; ++k)
-      for (const Vec3& p : places) points.push_back({p, std::remainder(2 * M_PI * k / parts, 2 * M_PI)});
+      for (const Vec3& p : places) points.push_back({p, wrap_angle(2 * std::numbers::pi * k / parts)});
     return points;
   }
   void ceilings() {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstdio>
+#include <numbers>
 
 #include "core/study/effects/columns.hpp"
 #include "core/study/effects/effect_rules.hpp"
@@ -10,7 +11,7 @@ namespace {
 /// Around, near and far.
 std::vector<Scale> tried_offsets() {
   std::vector<Scale> offsets;
-  constexpr double kTurn = 2 * M_PI / kEffectRules.offset_directions;
+  constexpr double kTurn = 2 * std::numbers::pi / kEffectRules.offset_directions;
   for (const double length : {kEffectRules.offset_near.value, kEffectRules.offset_far.value})
     for (int k = 0; k < kEffectRules.offset_directions; ++k)
       offsets.push_back({0, whole_millimetres(length * Vec3(std::cos(kTurn * k), std::sin(kTurn * k), 0))});

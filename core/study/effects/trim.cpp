@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <numbers>
+
 #include "core/study/effects/columns.hpp"
 #include "core/study/effects/on_the_model.hpp"
 
@@ -27,7 +29,7 @@ Effect trim() {
                     "Level the craft anew: calibrate the autopilot's level horizon, and look for a bent arm or motor.");
               },
           .manoeuvres = {{"turn a full yaw turn on the spot, far from walls", [](WindowRow& w, double s) {
-                            w.yaw = 2 * M_PI * s;
+                            w.yaw = 2 * std::numbers::pi * s;
                             w.R_WB = Eigen::AngleAxisd(w.yaw, Vec3::UnitZ()).toRotationMatrix();
                             w.around.walls.clear();
                           }}}};

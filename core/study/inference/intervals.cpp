@@ -6,6 +6,7 @@
 
 #include "core/study/inference/rules.hpp"
 #include "core/study/windows/distributions.hpp"
+#include "core/types/normal.hpp"
 
 namespace backwash::study {
 
@@ -26,8 +27,7 @@ Estimate averaged(const std::string& name, const std::vector<Guess>& guesses) {
       const double q = (a + b) / 2;
       double below = 0;
       for (const auto& g : guesses)
-        below +=
-            g.weight / total * (g.error > 0 ? 0.5 * std::erfc((g.value - q) / g.error / std::sqrt(2.0)) : q >= g.value);
+        below += g.weight / total * (g.error > 0 ? normal::below((q - g.value) / g.error) : q >= g.value);
       (below < p ? a : b) = q;
     }
     return (a + b) / 2;

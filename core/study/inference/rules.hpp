@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/study/windows/rule.hpp"
+#include "core/types/normal.hpp"
 
 namespace backwash::study {
 
@@ -71,7 +72,7 @@ struct Rules {
   Rule ridge{"ridge", 1e-9, "1", "derived: keeps an inverse finite, changes no digit that is told"};
   // Estimates
   Rule tail{"tail", 0.025, "1", "derived: an interval of 95 % leaves so much beyond each end"};
-  Rule normal_975{"normal_975", 1.959964, "1", "derived: its quantile of the normal distribution"};
+  Rule normal_975{"normal_975", normal::k975, "1", "derived: its quantile of the normal distribution"};
   Rule fine_scales{"fine_scales", 12, "scales", "chosen: the likelihood is averaged over so many"};
   Rule beyond_scales{"beyond_scales", 1.5, "1", "chosen: the finer grid goes so far beyond the searched scales"};
   Rule rounds{"rounds", 2, "rounds", "chosen: of the likeliest shape and where it pushes the craft"};
@@ -99,8 +100,8 @@ struct Rules {
   // Rotors against sound flights
   Rule rotor_level{"rotor_level", 0.05, "1", "chosen: over the four rotors"};
   Rule rotor_of_interest{"rotor_of_interest", 0.06, "of one rotor's thrust",
-                         "derived: the size of docs/measurements/confusion.md"};
-  Rule normal_80{"normal_80", 0.8416212, "1", "derived: quantile of the normal distribution at `power`"};
+                         "derived: the size of core/study/confusion.md"};
+  Rule normal_80{"normal_80", normal::k80, "1", "derived: quantile of the normal distribution at `power`"};
   Rule fewest_sound{"fewest_sound", 4, "flights", "derived: three contrasts and a scatter"};
   // Causes in some flights only
   Rule fewest_divided{"fewest_divided", 6, "flights", "derived: two levels and a scatter about each"};
@@ -134,7 +135,7 @@ struct Rules {
   Rule power_halvings{"power_halvings", 14, "1", "derived: the size is known to e^(13.8/2^14), 0.1 %"};
   Rule power_low{"power_low", -9.2, "ln of a parameter", "derived: 1e-4 of its unit, below every floor"};
   Rule power_high{"power_high", 4.6, "ln of a parameter", "derived: 100 of its unit, above every cause"};
-  Rule normal_95{"normal_95", 1.644854, "1", "derived: of the central 90 %, whose share of samples is told"};
+  Rule normal_95{"normal_95", normal::k95, "1", "derived: of the central 90 %, whose share of samples is told"};
   Rule least_variance{"least_variance", 1e-12, "(m/s²)²", "derived: so that a still window can be divided by"};
   Rule manoeuvre_windows{"manoeuvre_windows", 45, "windows", "derived: a flight of 90 s"};
   Rule manoeuvre_flights{"manoeuvre_flights", 12, "flights",
