@@ -6,8 +6,8 @@
 namespace backwash::config {
 namespace {
 
-constexpr std::string_view kProfile = kOdometryTexts[0], kTwist = kOdometryTexts[1], kChild = kOdometryTexts[2],
-                           kMessage = kOdometryTexts[3];
+constexpr std::string_view kProfile = "odometry.profile", kTwist = "odometry.twist", kChild = "odometry.child",
+                           kMessage = "odometry.message";
 
 /// One of the names of an enumeration.
 template <typename Enum>
@@ -37,36 +37,23 @@ tl::expected<void, ConfigError> read_custom(const StrictTable& file, const std::
 
 }  // namespace
 
-tl::expected<void, ConfigError> read_texts(const StrictTable& file, std::span<const TextKey> keys, bool needed) {
-  for (const auto& [key, target] : keys) {
-    if (!needed && !file.has(key)) continue;
-    auto text = file.text(key);
-    if (!text) return tl::unexpected(text.error());
-    *target = std::move(*text);
-  }
-  return {};
-}
-
-tl::expected<void, ConfigError> read_odometry(const StrictTable& file, Daemon& d) {
-  std::string name = "ros", twist, message = "odometry";
-  const TextKey own[] = {{kProfile, &name}, {kTwist, &twist}, {kChild, &d.odometry.child}, {kMessage, &message}};
-  if (auto read = read_texts(file, own, false); !read) return read;
+tl::expected<void, ConfigError> read_odometry(const StrictTable& file, const OdometryWords& said, Daemon& d) {
   const auto profiles = odometry_profiles();
-  const auto profile = std::ranges::find(profiles, name, &OdometryProfile::name);
+  const auto profile = std::ranges::find(profiles, said.profile, &OdometryProfile::name);
   if (profile == profiles.end()) {
     std::string all;
     for (const auto& p : profiles) all += (all.empty() ? "\"" : ", \"") + std::string(p.name) + '"';
     return tl::unexpected(file.error(kProfile, "needs one of " + all));
   }
-  if (name != "custom") {
+  if (said.profile != "custom") {
     for (const auto key : {kTwist, kChild, kMessage})
       if (file.has(key)) return tl::unexpected(file.error(key, "needs profile = \"custom\""));
     d.odometry.child = profile->child;
   }
   if (!file.has("frames.odometry") && d.frames.map != profile->frame) d.frames.odometry = profile->frame;
   d.odometry.twist = profile->twist;
-  if (!file.has(kRateLeast)) d.odometry.timing.rate_least = profile->rate_least;
-  return read_custom(file, twist, message, d.odometry);
+  if (!file.has("odometry.rate_least")) d.odometry.timing.rate_least = profile->rate_least;
+  return read_custom(file, said.twist, said.message, d.odometry);
 }
 
 tl::expected<void, ConfigError> read_frames(const StrictTable& file, const std::string& sent, Daemon& d) {

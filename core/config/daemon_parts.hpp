@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <span>
 #include <string>
-#include <string_view>
-#include <utility>
 
 #include "core/config/daemon_config.hpp"
 #include "core/config/strict_table.hpp"
@@ -12,16 +9,13 @@
 // Parts of the daemon's file that are read by themselves.
 namespace backwash::config {
 
-using TextKey = std::pair<std::string_view, std::string*>;
-
-tl::expected<void, ConfigError> read_texts(const StrictTable& file, std::span<const TextKey> keys, bool needed);
-
-inline constexpr std::string_view kOdometryTexts[] = {"odometry.profile", "odometry.twist", "odometry.child",
-                                                      "odometry.message"};
-inline constexpr std::string_view kRateLeast = "odometry.rate_least";
+/// What a file says of the odometry, as it stands there.
+struct OdometryWords {
+  std::string profile = "ros", twist, message = "odometry";
+};
 
 /// The profile's frames where none are given, and its twist; a custom one's own.
-tl::expected<void, ConfigError> read_odometry(const StrictTable& file, Daemon& d);
+tl::expected<void, ConfigError> read_odometry(const StrictTable& file, const OdometryWords& said, Daemon& d);
 
 /// `sent`: dds.tf. Who takes poses and closures from rt/tf would hear itself there.
 tl::expected<void, ConfigError> read_frames(const StrictTable& file, const std::string& sent, Daemon& d);

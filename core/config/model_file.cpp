@@ -22,36 +22,41 @@ constexpr Range kDecay{0, 1000, true};   // 1/m²
 constexpr double kMost = 10;             // of an effect's numbers
 constexpr double kLeastScale = 0.01;     // m
 
-std::vector<NumberKey> model_keys(Model& m) {
-  using enum NumberKey::Presence;
+std::vector<Key> model_keys(Model& m) {
+  using enum Key::Presence;
+  // clang-format off
   return {
-      {"base.horizontal", &m.base.horizontal, kVariance},
-      {"base.vertical", &m.base.vertical, kVariance},
-      {"ground.theta_max", &m.ground.theta_max, kAngle},
-      {"ground.l_max", &m.ground.l_max, kLength},
-      {"ground.l_footprint_max", &m.ground.l_footprint_max, kLength, optional},
-      {"ground.r0", &m.ground.r0, {0, 5, true}, optional},
-      {"ground.lambda.horizontal", &m.ground.lambda.horizontal, kVariance},
-      {"ground.lambda.vertical", &m.ground.lambda.vertical, kVariance},
-      {"ground.k1.horizontal", &m.ground.k1.horizontal, kVariance},
-      {"ground.k1.vertical", &m.ground.k1.vertical, kVariance},
-      {"ground.k2", &m.ground.k2, kDecay},
-      {"corner.phi_max", &m.corner.phi_max, kAngle},
-      {"corner.l_max", &m.corner.l_max, kLength},
-      {"corner.lambda.normal", &m.corner.lambda.normal, kVariance},
-      {"corner.lambda.tangential", &m.corner.lambda.tangential, kVariance},
-      {"corner.lambda.vertical", &m.corner.lambda.vertical, kVariance},
-      {"wall.theta_min", &m.wall.theta_min, kAngle},
-      {"wall.l_max", &m.wall.l_max, kLength},
-      {"wall.k1.normal", &m.wall.k1.normal, kVariance},
-      {"wall.k1.tangential", &m.wall.k1.tangential, kVariance},
-      {"wall.k1.vertical", &m.wall.k1.vertical, kVariance},
-      {"wall.k2", &m.wall.k2, kDecay},
-      {"bound.kappa", &m.bound.kappa, {0, 10}, optional},
-      {"bound.mean.horizontal", &m.bound.mean_horizontal, {0, 10}, with_parent},
-      {"bound.mean.vertical", &m.bound.mean_vertical, {0, 10}, with_parent},
-      {"bound.tau_w", &m.bound.tau_w, {0, 10, true}, optional},
+      {"base.horizontal", &m.base.horizontal, kVariance, required, "(m/s²)²", "Σ_0", "hover 2 m and more from everything"},
+      {"base.vertical", &m.base.vertical, kVariance, required, "(m/s²)²", "along z", "the same"},
+      {"ground.theta_max", &m.ground.theta_max, kAngle, required, "rad", "gate θ̄_g", "preset"},
+      {"ground.l_max", &m.ground.l_max, kLength, required, "m", "gate l̄_g: where the floor is not felt any more", "preset"},
+      {"ground.l_footprint_max", &m.ground.l_footprint_max, kLength, optional, "m", "gate l̄_u of the rotors' footprint", "preset"},
+      {"ground.r0", &m.ground.r0, {0, 5, true}, optional, "m", "footprint; the vehicle's `body.diagonal_radius` takes its place"},
+      {"ground.lambda.horizontal", &m.ground.lambda.horizontal, kVariance, required, "(m/s²)²", "λ_g", "hovers at several heights over a floor"},
+      {"ground.lambda.vertical", &m.ground.lambda.vertical, kVariance, required, "(m/s²)²", "along z", "the same"},
+      {"ground.k1.horizontal", &m.ground.k1.horizontal, kVariance, required, "(m/s²)²/m²", "k_g1", "the same"},
+      {"ground.k1.vertical", &m.ground.k1.vertical, kVariance, required, "(m/s²)²/m²", "along z", "the same"},
+      {"ground.k2", &m.ground.k2, kDecay, required, "1/m²", "k_g2", "the same"},
+      {"corner.phi_max", &m.corner.phi_max, kAngle, required, "rad", "gate φ̄_c", "preset"},
+      {"corner.l_max", &m.corner.l_max, kLength, required, "m", "gate l̄_c", "preset"},
+      {"corner.lambda.normal", &m.corner.lambda.normal, kVariance, required, "(m/s²)²", "λ_c across the wall", "low hovers beside the foot of a wall"},
+      {"corner.lambda.tangential", &m.corner.lambda.tangential, kVariance, required, "(m/s²)²", "along it", "the same"},
+      {"corner.lambda.vertical", &m.corner.lambda.vertical, kVariance, required, "(m/s²)²", "vertical", "the same"},
+      {"wall.theta_min", &m.wall.theta_min, kAngle, required, "rad", "gate θ_w", "preset"},
+      {"wall.l_max", &m.wall.l_max, kLength, required, "m", "gate l̄_w", "preset"},
+      {"wall.k1.normal", &m.wall.k1.normal, kVariance, required, "(m/s²)²/m²", "k_w1 across the wall", "hovers at several distances from a wall"},
+      {"wall.k1.tangential", &m.wall.k1.tangential, kVariance, required, "(m/s²)²/m²", "along it", "the same"},
+      {"wall.k1.vertical", &m.wall.k1.vertical, kVariance, required, "(m/s²)²/m²", "vertical", "the same"},
+      {"wall.k2", &m.wall.k2, kDecay, required, "1/m²", "k_w2", "the same"},
+      {"bound.kappa", &m.bound.kappa, {0, 10}, optional, "", "standard deviations in the bound", "chosen"},
+      {"bound.mean.horizontal", &m.bound.mean_horizontal, {0, 10}, with_parent, "m/s²", "largest steady push", "mean of w over long hovers, with set-points in the log", "0"},
+      {"bound.mean.vertical", &m.bound.mean_vertical, {0, 10}, with_parent, "m/s²", "along z", "the same", "0"},
+      {"bound.tau_w", &m.bound.tau_w, {0, 10, true}, optional, "s", "correlation time, for the chance mode, `--air model` and `study`", "spectrum of w (`calibrate`)"},
+      {"confidence", {}, {}, optional, "", "intervals that `calibrate` wrote, by key"},
+      {"provenance", {}, {}, optional, "", "sources that `calibrate` wrote; not read"},
+      {"extension", {}, {}, optional, "", "what `study --out` added, below"},
   };
+  // clang-format on
 }
 
 std::string effect_names() {
@@ -100,12 +105,16 @@ tl::expected<ModelEffect, std::string> read_effect(const toml::node& node) {
 
 }  // namespace
 
+std::string model_file_keys() {
+  Model model;
+  return markdown(model_keys(model));
+}
+
 tl::expected<Model, ConfigError> load_model(const std::string& path) {
-  constexpr std::string_view kNotRead[] = {"confidence", "provenance", "extension"};
   const auto file = StrictTable::open(path, ".model.toml");
   if (!file) return tl::unexpected(file.error());
   Model model;
-  if (auto read = file->read(model_keys(model), kNotRead); !read) return tl::unexpected(read.error());
+  if (auto read = file->read(model_keys(model)); !read) return tl::unexpected(read.error());
   for (const toml::node* effect : file->nodes("extension.term", "effect")) {
     auto read = read_effect(*effect);
     if (!read) return tl::unexpected(file->error_at(*effect, "extension.term.effect", read.error()));
@@ -135,16 +144,18 @@ double rounded(double value, int digits) {
 toml::table model_table(const Model& model) {
   Model copy = model;
   toml::table whole;
-  for (const auto& [path, target, range, presence] : model_keys(copy)) {
+  for (const Key& key : model_keys(copy)) {
+    const auto* const number = std::get_if<double*>(&key.target);
+    if (!number) continue;
     toml::table* table = &whole;
-    std::string_view rest = path;
+    std::string_view rest = key.path;
     for (auto dot = rest.find('.'); dot != std::string_view::npos; dot = rest.find('.')) {
       auto& inner = *table->emplace<toml::table>(rest.substr(0, dot)).first->second.as_table();
       inner.is_inline(table != &whole);
       table = &inner;
       rest.remove_prefix(dot + 1);
     }
-    table->insert_or_assign(rest, rounded(*target, 6));
+    table->insert_or_assign(rest, rounded(**number, 6));
   }
   return whole;
 }

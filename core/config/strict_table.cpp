@@ -65,21 +65,55 @@ std::string_view parent_of(std::string_view path) {
 }
 
 /// Names that may follow `prefix` ("" or "a."), in the order in which they are described.
-std::string names_below(std::string_view prefix, std::span<const NumberKey> keys,
-                        std::span<const std::string_view> others) {
+std::string names_below(std::string_view prefix, std::span<const Key> keys) {
   std::string list;
   std::set<std::string_view> seen;
-  const auto add = [&](std::string_view path) {
-    if (!path.starts_with(prefix)) return;
-    const std::string_view name = path.substr(prefix.size(), path.find('.', prefix.size()) - prefix.size());
+  for (const Key& key : keys) {
+    if (!key.path.starts_with(prefix)) continue;
+    const std::string_view name = key.path.substr(prefix.size(), key.path.find('.', prefix.size()) - prefix.size());
     if (seen.insert(name).second) list += (list.empty() ? "" : ", ") + std::string(name);
-  };
-  for (const std::string_view other : others) add(other);
-  for (const NumberKey& key : keys) add(key.path);
+  }
   return list;
 }
 
+template <typename... Of>
+struct Each : Of... {
+  using Of::operator()...;
+};
+
+std::string number_text(double value) {
+  std::ostringstream out;
+  out << std::setprecision(10) << value;
+  return out.str();
+}
+
+std::string word(const std::string& text) { return text.empty() ? "none" : "`" + text + "`"; }
+
+/// What counts where the key is not in the file.
+std::string default_text(const Key& key) {
+  if (key.presence == Key::Presence::required) return "needed";
+  if (!key.absent.empty()) return std::string(key.absent);
+  if (key.presence == Key::Presence::with_parent) return "with its table";
+  return std::visit(Each{[](std::monostate) { return std::string(); }, [](const double* x) { return number_text(*x); },
+                         [](const int* x) { return std::to_string(*x); },
+                         [](const bool* x) { return std::string(*x ? "true" : "false"); },
+                         [](const std::string* x) { return word(*x); },
+                         [](const std::optional<double>* x) { return *x ? number_text(**x) : "none"; }},
+                    key.target);
+}
+
 }  // namespace
+
+std::string markdown(std::span<const Key> keys) {
+  std::ostringstream out;
+  for (const Key& key : keys) {
+    const Range& r = key.range;
+    out << "| `" << key.path << "` | " << key.unit << " | ";
+    if (r.high != r.low) out << (r.above_low ? "(" : "[") << number_text(r.low) << ", " << number_text(r.high) << "]";
+    out << " | " << default_text(key) << " | " << key.meaning << " | " << key.how << " |\n";
+  }
+  return out.str();
+}
 
 tl::expected<std::uint64_t, ConfigError> hash_of_files(const std::string& vehicle, const std::string& model) {
   const auto first = contents(vehicle, ".vehicle.toml"), second = contents(model, ".model.toml");
@@ -144,49 +178,61 @@ ConfigError StrictTable::error_at(const toml::node& node, std::string_view path,
 }
 
 tl::expected<void, ConfigError> StrictTable::reject_unknown(const toml::table& table, const std::string& prefix,
-                                                            std::span<const NumberKey> keys,
-                                                            std::span<const std::string_view> others) const {
+                                                            std::span<const Key> keys) const {
   for (const auto& [key, node] : table) {
     const std::string path = prefix + std::string(key.str());
-    if (std::find(others.begin(), others.end(), path) != others.end()) continue;
     // A quoted key with a dot in it only looks like a path.
     const bool quoted_path = key.str().find('.') != std::string_view::npos;
-    if (!quoted_path && std::any_of(keys.begin(), keys.end(), [&](const NumberKey& k) { return k.path == path; }))
-      continue;
-    const bool table_of_numbers =
-        std::any_of(keys.begin(), keys.end(), [&](const NumberKey& k) { return k.path.starts_with(path + "."); });
-    const bool table_of_others =
-        std::any_of(others.begin(), others.end(), [&](std::string_view o) { return o.starts_with(path + "."); });
-    if (quoted_path || !(table_of_numbers || table_of_others)) {
+    if (!quoted_path && std::ranges::find(keys, path, &Key::path) != keys.end()) continue;
+    const bool holds_keys = std::ranges::any_of(keys, [&](const Key& k) { return k.path.starts_with(path + "."); });
+    if (quoted_path || !holds_keys) {
       std::ostringstream message;
       message << file_ << ":" << key.source().begin.line << ": key '" << path << "' = " << value_text(node)
-              << ": unknown; known here: " << names_below(prefix, keys, others);
+              << ": unknown; known here: " << names_below(prefix, keys);
       return tl::unexpected(ConfigError{ConfigError::Kind::invalid, message.str()});
     }
-    if (!node.is_table())
-      return tl::unexpected(error(path, "needs a table with " + names_below(path + ".", keys, others)));
-    if (auto below = reject_unknown(*node.as_table(), path + ".", keys, others); !below) return below;
+    if (!node.is_table()) return tl::unexpected(error(path, "needs a table with " + names_below(path + ".", keys)));
+    if (auto below = reject_unknown(*node.as_table(), path + ".", keys); !below) return below;
   }
   return {};
 }
 
-tl::expected<void, ConfigError> StrictTable::read(std::span<const NumberKey> keys,
-                                                  std::span<const std::string_view> others) const {
-  if (auto known = reject_unknown(root_, "", keys, others); !known) return known;
-  for (const NumberKey& key : keys) {
+tl::expected<void, ConfigError> StrictTable::store(const Key& key) const {
+  const auto stored = [](auto value, auto* target) -> tl::expected<void, ConfigError> {
+    if (!value) return tl::unexpected(value.error());
+    *target = std::move(*value);
+    return {};
+  };
+  const auto number = [&]() -> tl::expected<double, ConfigError> {
     const toml::node* node = root_.at_path(key.path).node();
     const Range& range = key.range;
-    if (!node) {
-      const bool may_miss = key.presence == NumberKey::Presence::optional ||
-                            (key.presence == NumberKey::Presence::with_parent && !has(parent_of(key.path)));
-      if (may_miss) continue;
-      return tl::unexpected(error(key.path, range_text(range)));
-    }
     // A TOML boolean would convert to a number; only integers and floats are meant.
-    const auto number = node->is_number() ? node->value<double>() : std::nullopt;
-    const bool fits = number && (range.above_low ? *number > range.low : *number >= range.low) && *number <= range.high;
+    const auto value = node && node->is_number() ? node->value<double>() : std::nullopt;
+    const bool fits = value && (range.above_low ? *value > range.low : *value >= range.low) && *value <= range.high;
     if (!fits) return tl::unexpected(error(key.path, range_text(range)));
-    *key.target = *number;
+    return *value;
+  };
+  const auto whole = [&]() -> tl::expected<int, ConfigError> {
+    const auto value = number();
+    if (!value) return tl::unexpected(value.error());
+    if (*value != std::floor(*value)) return tl::unexpected(error(key.path, "needs a whole number"));
+    return static_cast<int>(*value);
+  };
+  return std::visit(Each{[](std::monostate) { return tl::expected<void, ConfigError>(); },
+                         [&](double* x) { return stored(number(), x); },
+                         [&](std::optional<double>* x) { return stored(number(), x); },
+                         [&](int* x) { return stored(whole(), x); }, [&](bool* x) { return stored(flag(key.path), x); },
+                         [&](std::string* x) { return stored(text(key.path), x); }},
+                    key.target);
+}
+
+tl::expected<void, ConfigError> StrictTable::read(std::span<const Key> keys) const {
+  if (auto known = reject_unknown(root_, "", keys); !known) return known;
+  for (const Key& key : keys) {
+    const bool may_miss = key.presence == Key::Presence::optional ||
+                          (key.presence == Key::Presence::with_parent && !has(parent_of(key.path)));
+    if (may_miss && !has(key.path)) continue;
+    if (auto good = store(key); !good) return good;
   }
   return {};
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <variant>
 #include <vector>
 
 #include "core/config/config.hpp"
@@ -19,18 +20,32 @@ struct Range {
   bool above_low = false;
 };
 
-/// One number of a file: the only description of its name, range and whether it may be absent.
-struct NumberKey {
+/// One key of a file: the only description of it, by which it is read, told of and printed in docs/interfaces.md.
+struct Key {
   enum class Presence {
     required,
     optional,     ///< the target keeps its default
     with_parent,  ///< the table that holds it may be absent as a whole, not this key alone
   };
+  /// Where its value goes. Nowhere: whatever it holds is allowed, and left alone.
+  using Target = std::variant<std::monostate, double*, int*, bool*, std::string*, std::optional<double>*>;
+
   std::string_view path;  ///< dotted
-  double* target;
-  Range range;
+  Target target;
+  Range range = {0, 0};  ///< of a number; of an int whole ones alone
   Presence presence = Presence::required;
+  std::string_view unit, meaning;
+  std::string_view how = {};     ///< to measure or choose it
+  std::string_view absent = {};  ///< what counts where it is not in the file, if the target's own value does not say so
 };
+
+/// The keys as rows of Markdown: | key | unit | range | default | meaning | how |. Their targets hold the defaults.
+std::string markdown(std::span<const Key> keys);
+
+/// markdown() of the keys of a file of each kind.
+std::string vehicle_file_keys();
+std::string model_file_keys();
+std::string daemon_file_keys();
 
 /// A TOML document that accepts exactly the keys it is told of. Every error is one line
 /// `FILE:LINE: key 'a.b' = value: what would be right`.
@@ -39,9 +54,9 @@ class StrictTable {
   /// `path`: a file, or `builtin:NAME` for the embedded NAME`suffix`. Errors: not_found; invalid for bad TOML.
   static tl::expected<StrictTable, ConfigError> open(const std::string& path, std::string_view suffix);
 
-  /// Stores every number. `others`: keys that are allowed and left alone, whatever they hold. Error: the first unknown
-  /// key, wrong type, value out of range (NaN is in no range) or missing key.
-  tl::expected<void, ConfigError> read(std::span<const NumberKey> keys, std::span<const std::string_view> others) const;
+  /// Stores every value. Error: the first unknown key, wrong type, value out of range (NaN is in no range) or missing
+  /// key.
+  tl::expected<void, ConfigError> read(std::span<const Key> keys) const;
   /// A string that is not empty and holds no control characters.
   tl::expected<std::string, ConfigError> text(std::string_view path) const;
   /// true or false.
@@ -60,8 +75,8 @@ class StrictTable {
  private:
   StrictTable(std::string file, toml::table root) : file_(std::move(file)), root_(std::move(root)) {}
   tl::expected<void, ConfigError> reject_unknown(const toml::table& table, const std::string& prefix,
-                                                 std::span<const NumberKey> keys,
-                                                 std::span<const std::string_view> others) const;
+                                                 std::span<const Key> keys) const;
+  tl::expected<void, ConfigError> store(const Key& key) const;
 
   std::string file_;
   toml::table root_;

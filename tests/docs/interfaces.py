@@ -1,80 +1,90 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/interfaces.md says what the programs are: nothing is missing from it and nothing in it is made up.
+"""docs/interfaces.md says what the programs are.
 
-interfaces.py SOURCE_DIR BUILD_DIR
+interfaces.py SOURCE_DIR BUILD_DIR [--update]
 
-Keys of the files, as the programs tell them, with range and presence by the strict tables of core/config; verbs and options by --help, names of JSON, exit codes,
-columns of the flight log, topics with type and delivery, verbs and results of commands, MAVLink messages.
+What stands between `<!-- printed: NAME -->` and `<!-- end -->` is printed, by --update into the page, from where it is declared: keys of files from
+core/config (the program tables), options from --help, topics with type, direction and delivery from services. The rest is written by hand, and
+compared: JSON names, exit codes, columns of CSV, commands, MAVLink messages.
 """
 import pathlib
 import re
 import subprocess
 import sys
 
-from configuration import check_keys
 from page import expect, quoted, rows, sections, wrong
 
-# --- programs --------------------------------------------------------------------------------------------------------
+# --- printed ---------------------------------------------------------------------------------------------------------
 
-def help_of(*command: str) -> tuple[set[str], set[str]]:
-    """Verbs and options of a program, by its --help."""
-    text = subprocess.run([*command, "--help"], capture_output=True, text=True, check=True).stdout
-    verbs = re.findall(r"^  (\w+) {2,}", text.split("Subcommands:")[1], re.M) if "Subcommands:" in text else []
-    options = {o for line in re.findall(r"^  (-\S+)", text, re.M) for o in line.split(",")}
-    return set(verbs), options - {"-h", "--help", "--version"}
+EVERYWHERE = ("-h,--help", "--version", "--json", "--force", "--quiet", "--threads")  # the page's conventions have them
 
 
-def defaults_of(*command: str) -> list[tuple[str, str]]:
-    """Options with a default, and its first word, by --help; what differs from machine to machine is left out."""
-    text = subprocess.run([*command, "--help"], capture_output=True, text=True, check=True).stdout
-    found = re.findall(r"^  (?:-\w,)?(--[\w-]+) +[A-Z][A-Z, ]*(?:x \d+)?(?::\S+(?: in \[[^\]]*\])?)?=(\S+)", text, re.M)
-    return [(option, default.strip("[]").split(",")[0]) for option, default in found if option != "--station"]
+# Of these a name says all: the page's conventions tell what the files are.
+PLAIN = ("OctoMap file or builtin:NAME", "model file or builtin:NAME", "vehicle file or builtin:NAME", "HTML page to write")
 
 
-def check_defaults(where: str, command: list[str], cells: list[str]) -> None:
-    """Each default of --help stands in the line that documents its option."""
-    for option, default in defaults_of(*command):
-        if not any(option in options_in(c) and re.search(rf"(?<![\w.]){re.escape(default)}(?![\w])", c) for c in cells):
-            wrong.append(f"{where}: {option} has the default {default}, which is not documented")
+def options(help_text: str) -> dict[str, str]:
+    """Arguments and options of a --help: name with its values and default, and what it is. Those of one meaning stand together."""
+    text = re.sub(r"\n {20,}(?=\S)", "  ", help_text).split("Subcommands:")[0]  # a name may be too long for its column
+    told: dict[str, str] = {}
+    for name, spec, meaning in re.findall(r"^  ((?:-\w,)?-{0,2}[\w-]+)(?: (\S.*?))?(?: {2,}(.*))?$", text, re.M):
+        if name in EVERYWHERE or name.startswith("backwash"):
+            continue
+        kind, _, default = re.sub(r"\S+@\S+", "user@host", spec).removesuffix(" REQUIRED").partition("=")
+        kind = re.sub(r"^(TEXT|FLOAT|INT|UINT)\b(?: x \d| \.\.\.)?:?| ?Excludes:.*|[{}]", "", kind).replace("NONNEGATIVE", "0 or more").replace("POSITIVE", "above 0")
+        kind = kind.lower() if "," in kind else kind
+        notes = [kind.strip(), "needed" if spec.endswith("REQUIRED") else "", f"default {default.strip()}" if default.strip() else ""]
+        cell = f"`{name.split(',')[-1]}`" + (f" ({'; '.join(filter(None, notes))})" if any(notes) else "")
+        meaning = "" if meaning in PLAIN else meaning
+        told[meaning] = f"{told[meaning]}, {cell}" if meaning in told else cell
+    return told
 
 
-def options_in(text: str) -> set[str]:
-    return {o for q in quoted(text) for o in re.findall(r"(?<![\w-])--?[a-z][a-z-]*", q)}
+def listed(told: dict[str, str]) -> str:
+    return "".join(f"- {cell}: {meaning}\n" if meaning else f"- {cell}\n" for meaning, cell in told.items())
 
 
-def check_programs(root: pathlib.Path, build: pathlib.Path, sections_of: dict[str, str]) -> None:
-    services = build / "services"
-    usage = subprocess.run(["bash", str(root / "fly"), "--help"], capture_output=True, text=True, check=True).stdout
-    expect("fly", options_in(sections_of["fly"]), set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", usage)))
-    verbs, _ = help_of(str(services / "backwash"))
-    every = options_in(sections_of["backwash"].split("\n|")[0].split(".")[0])
-    expect("verbs of backwash", {h.split()[1] for h in sections_of if h.startswith("backwash ")}, verbs)
-    for verb in verbs & {h.split()[1] for h in sections_of if h.startswith("backwash ")}:
-        # Options stand in the tables' first column.
-        cells = [c for c in rows(sections_of[f"backwash {verb}"]) if c[0].startswith("`-")]
-        inner, options = help_of(str(services / "backwash"), verb)
-        for below in inner:
-            options |= help_of(str(services / "backwash"), verb, below)[1]
-            if f"`backwash {verb} {below}`" not in sections_of[f"backwash {verb}"]:
-                wrong.append(f"backwash {verb}: {below} is not documented")
-        expect(f"backwash {verb}", {o for c in cells for o in options_in(c[0])} | every, options)
-        check_defaults(f"backwash {verb}", [str(services / "backwash"), verb], [" ".join(c) for c in cells])
-    for program in ("backwashd", "backwash-bench"):
-        _, options = help_of(str(services / program))
-        expect(program, {o for c in rows(sections_of[program]) for o in options_in(c[0])}, options)
-        check_defaults(program, [str(services / program)], [" ".join(c) for c in rows(sections_of[program])])
-    verbs, common = help_of(str(services / "backwashctl"))
-    listed = [c for c in rows(sections_of["backwashctl"]) if len(c) == 3 and c[0].startswith("`")]
-    expect("verbs of backwashctl", {v for c in listed for v in quoted(c[0])}, verbs)
-    every, of_verbs = options_in(sections_of["backwashctl"].split("\n|")[0]), set()
-    expect("backwashctl", every, common)
-    check_defaults("backwashctl", [str(services / "backwashctl")], [sections_of["backwashctl"].split("\n|")[0]])
-    for cells in listed:
-        actual = set()
-        for verb in set(quoted(cells[0])) & verbs:
-            actual |= help_of(str(services / "backwashctl"), verb)[1]
-        expect(f"backwashctl {cells[0]}", options_in(cells[2]), actual)
+def help_of(*command: str) -> str:
+    return subprocess.run([*command, "--help"], capture_output=True, text=True, check=True).stdout
+
+
+def verbs_of(text: str) -> list[tuple[str, str]]:
+    return re.findall(r"^  (\w+) {2,}(.*)", text.split("Subcommands:")[1], re.M) if "Subcommands:" in text else []
+
+
+def printed(root: pathlib.Path, build: pathlib.Path) -> dict[str, str]:
+    """Every block by its name."""
+    run = subprocess.run([build / "tests/tables"], capture_output=True, text=True, check=True).stdout
+    head = "| key | unit | range | default | meaning | how to measure or choose it |\n| --- | --- | --- | --- | --- | --- |\n"
+    parts = re.split(r"^== (.*)\n", re.sub(r"docs/(\w+\.md)", r"[\1](\1)", run), flags=re.M)[1:]
+    blocks = {name: head + table for name, table in zip(parts[::2], parts[1::2])}
+
+    def about(path: str, verb: str, what: str) -> str:
+        text = help_of(path, *verb.split())
+        of_inner = {(v, w): options(help_of(path, verb, v)) for v, w in verbs_of(text)}
+        shared = {item for told in of_inner.values() for item in told.items() if sum(item in o.items() for o in of_inner.values()) > 1}
+        out = f"{what}.\n\n{listed(options(text) or dict(sorted(shared)))}"
+        for (v, w), told in of_inner.items():
+            takes = "".join(f", {cell.split(' ')[0]}" for item in told.items() if item in shared for cell in [item[1]])
+            out += f"\n`{pathlib.Path(path).name} {verb} {v}`{takes}: {w}.\n\n{listed(dict(i for i in told.items() if i not in shared))}"
+        return re.sub(r"\n{3,}", "\n\n", out).rstrip("\n") + "\n"
+
+    for program in ("backwash", "backwashd", "backwash-bench"):
+        path = str(build / "services" / program)
+        text = help_of(path)
+        blocks |= {f"{program} {verb}": about(path, verb, what) for verb, what in verbs_of(text)} or {program: listed(options(text))}
+    path, verbs, of_verbs = str(build / "services/backwashctl"), "", ""
+    for verb, what in verbs_of(help_of(path)):
+        told = options(help_of(path, verb))
+        verbs += f"- `{verb}`{' `--wait`' if told.pop('return when it is done', '') else ''}: {what}\n"
+        of_verbs += listed({m: cell.replace("`", f"`{verb} ", 1) for m, cell in told.items()})
+    blocks["backwashctl"] = f"{listed(options(help_of(path)))}\nVerbs; `--wait` returns when it is done:\n\n{verbs}\nOptions of one verb:\n\n{of_verbs}"
+    blocks["DDS"] = topics(root)
+    return blocks
+
+
+BLOCK = re.compile(r"(<!-- printed: (.*?) -->\n)(.*?)(<!-- end -->)", re.S)
 
 
 # --- JSON and exit codes ---------------------------------------------------------------------------------------------
@@ -110,15 +120,11 @@ def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> No
     for measures in (root / "research/compare").glob("compare*.cpp"):  # names of Measure
         written |= set(re.findall(r'"([a-z]\w*)"', measures.read_text()))
     for heading, section in sections_of.items():
-        tables = re.split(r"\n\n", section)
-        for table in tables:
-            if not table.lstrip().startswith("| JSON") and heading != "JSON of status":
+        for part in re.split(r"\n\n", section):
+            if not part.lstrip().startswith("JSON"):
                 continue
-            for cells in rows(table)[1:]:
-                for name in quoted(cells[0]):
-                    for part in re.findall(r"\w+", name):
-                        if part not in written:
-                            wrong.append(f"{heading}: no JSON is called {part}")
+            for name in (q for line in part.splitlines()[1:] for q in quoted(line.split(":")[0])):
+                wrong.extend(f"{heading}: no JSON is called {x}" for x in re.findall(r"\w+", name) if x not in written)
 
 
 def check_exit_codes(root: pathlib.Path, sections_of: dict[str, str]) -> None:
@@ -173,21 +179,29 @@ DELIVERY = {"latest": "best effort, keep last 1", "scans": "best effort, keep la
             "state": "reliable, transient local, keep last 1"}
 
 
-def check_dds(root: pathlib.Path, sections_of: dict[str, str]) -> None:
+def topics(root: pathlib.Path) -> str:
+    """The topics by their declarations; what is in one stands behind it in the page."""
     code = (root / "services/dds/topics.hpp").read_text()
-    actual = set()
+    ours = re.search(r"case Role::vehicle:(.*?)break;", (root / "services/security/documents.cpp").read_text(), re.S)[1]
+    said = {c[0].rsplit("/", 1)[1]: c[4] for c in rows(sections((root / "docs/interfaces.md").read_text())["DDS"]) if c[0].startswith("rt/NAMESPACE")}
+    out = "| topic | type | direction | delivery | frame and content |\n| --- | --- | --- | --- | --- |\n"
     for type_, name, delivery in re.findall(
             r"return (\w+)_desc; \}\s*static constexpr const char\* kName = \"(\w+)\";\s*"
             r"static constexpr Delivery kDelivery = Delivery::(\w+);", code):
-        actual.add((name, type_.replace("_msg_dds__", "::msg::dds_::"), DELIVERY[delivery]))
-    documented = {(re.search(r"/(\w+)(?: |$)", c[0])[1], c[1], c[3]) for c in rows(sections_of["DDS"])[1:]}
-    expect("DDS topics", documented, actual)
+        way = "out" if f'"{name}"' in ours else "in"
+        if not said.get(name):
+            wrong.append(f"DDS: what is in {name}?")
+        out += f"| rt/NAMESPACE/{name} | {type_.replace('_msg_dds__', '::msg::dds_::')} | {way} | {DELIVERY[delivery]} | {said.get(name, '')} |\n"
+    return out
+
+
+def check_dds(root: pathlib.Path, sections_of: dict[str, str]) -> None:
     idl = (root / "idl/backwash_msgs.idl").read_text()
     for prefix in ("COMMAND_", "ACK_"):
         cells = [c[0] for c in rows(sections_of["Commands"])]
         expect(f"{prefix}…", {w for c in cells for w in re.findall(rf"{prefix}\w+", c)},
                set(re.findall(rf"const octet ({prefix}\w+)", idl)))
-    status = {q for c in rows(sections_of["JSON of status"])[1:] for q in quoted(c[0])}
+    status = {q for line in sections_of["JSON of status"].splitlines() for q in quoted(line.split(":")[0])}
     expect("JSON of status", status, names_of_status(root))
 
 
@@ -201,12 +215,54 @@ def check_mavlink(root: pathlib.Path, sections_of: dict[str, str]) -> None:
     expect("MAVLink messages", words, actual)
 
 
+# --- the daemon's example --------------------------------------------------------------------------------------------
+
+def example(text: str, table: str) -> str:
+    """The example with what the table says behind each key; keys that it lacks stand at their table's end as comments."""
+    keys = {quoted(c[0])[0]: c for c in rows(table)[1:]}
+    out: list[str] = []
+    seen, section = set(), ""
+
+    def line(beginning: str, key: str) -> str:
+        cells = keys[key]
+        seen.add(key)
+        words = re.sub(r"\[(\w+\.md)\]\(.*?\)", r"docs/\1", f"{cells[1]}: {cells[4]}" if cells[1] else cells[4])
+        words = re.sub(r"\[(.*?)\]\(#.*?\)", lambda m: "docs/interfaces.md" + f', "{m[1]}"', words).replace("`", "")
+        return f"{beginning:<30} # {words}"
+
+    def rest() -> list[str]:
+        missing = [k for k in keys if k not in seen and k.rpartition(".")[0] == section]
+        return [line(f"# {k.rpartition('.')[2]} = {cells[3] if re.fullmatch(r'[-.0-9]+|true|false', (cells := keys[k])[3]) else chr(34) * 2}", k) for k in missing]
+
+    for old in text.splitlines():
+        if table_of := re.match(r"(?:# )?\[([\w.]+)\]", old):
+            at = len(out) - (not out[-1])
+            out[at:at] = rest()
+            section = table_of[1]
+        found = re.match(r'((?:# )?(\w+) = (?:"[^"]*"|[^#" ]+))(?= *(?:#|$))', old)
+        key = found and ".".join(filter(None, (section, found[2])))
+        if re.match(r" +#", old):
+            continue
+        out.append(line(found[1], key) if key in keys else old)
+    return "\n".join(out + rest()) + "\n"
+
+
 def main() -> int:
     root, build = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-    text = (root / "docs/interfaces.md").read_text()
+    page = root / "docs/interfaces.md"
+    text = page.read_text()
+    blocks = printed(root, build)
+    shipped = root / "core/config/files/backwashd.daemon.toml"
+    expect("printed block", {m[1] for m in BLOCK.findall(text)}, set(blocks))
+    for file, whole in ((page, BLOCK.sub(lambda m: m[1] + blocks.get(m[2], m[3]) + m[4], text)), (shipped, example(shipped.read_text(), blocks["Daemon file"]))):
+        if "--update" in sys.argv:
+            file.write_text(whole)
+        elif whole != file.read_text():
+            wrong.append(f"{file.name} is not what the source says; mend by: tests/docs/interfaces.py {root} {build} --update")
+    text = page.read_text()
     sections_of = sections(text)
-    check_keys(root, build, sections_of)
-    check_programs(root, build, sections_of)
+    spec = re.search(r'only\(path, file, \{([^}]*)\}', (root / "services/backwash/flight_spec.cpp").read_text())[1]
+    expect("Flight specification", {quoted(c[0])[0] for c in rows(sections_of["Flight specification"])[1:]}, set(re.findall(r'"(\w+)"', spec)))
     check_json(root, text, sections_of)
     check_exit_codes(root, sections_of)
     check_columns(root, sections_of)
