@@ -2,7 +2,7 @@
 #include <cinttypes>
 #include <cstdio>
 
-#include "core/log/mcap_export.hpp"
+#include "core/log/mcap_flight.hpp"
 #include "core/log/raw_flight.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"

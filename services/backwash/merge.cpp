@@ -5,7 +5,7 @@
 #include "core/log/autopilot_flight.hpp"
 #include "core/log/dataflash.hpp"
 #include "core/log/log_file.hpp"
-#include "core/log/mcap_export.hpp"
+#include "core/log/mcap_flight.hpp"
 #include "core/log/ulog.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
