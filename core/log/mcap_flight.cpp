@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include "core/log/ros_messages.hpp"
@@ -75,10 +74,10 @@ void McapFlight::take(const RawRecord& record) {
   take_poses_until(record.header.t_ns);
   now_ns_ = record.header.t_ns + wall_ns_.value_or(0);
   newest_ns_ = std::max(newest_ns_, now_ns_);
-  Bytes raw(sizeof record.header);
-  std::memcpy(raw.data(), &record.header, sizeof record.header);
-  raw.insert(raw.end(), record.bytes.begin(), record.bytes.end());
-  say(kRaw, ros::octets(raw));
+  Bytes raw = ros::octets(sizeof record.header + record.bytes.size());
+  const auto* header = reinterpret_cast<const std::uint8_t*>(&record.header);
+  raw.insert(raw.end(), header, header + sizeof record.header);
+  say(kRaw, raw, record.bytes);
   if (const auto* row = kind == odometry ? payload<OdometryRecord>(record) : nullptr) take_odometry(*row);
   if (const auto* row = kind == tick ? payload<TickRecord>(record) : nullptr) take_tick(*row);
   if (kind == offer) take_offer(record);
@@ -106,11 +105,11 @@ std::map<std::string, std::uint64_t> McapFlight::messages() const {
   return messages;
 }
 
-void McapFlight::say(Channel channel, const Bytes& cdr) {
+void McapFlight::say(Channel channel, const Bytes& cdr, std::span<const std::uint8_t> more) {
   writer_.write(static_cast<std::uint16_t>(channel + 1),
                 {static_cast<std::uint64_t>(std::max<std::int64_t>(newest_ns_, 0)),
                  static_cast<std::uint64_t>(std::max<std::int64_t>(now_ns_, 0))},
-                cdr);
+                cdr, more);
 }
 
 /// The autopilot's poses up to a record; none before the first record.

@@ -10,6 +10,8 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "core/log/autopilot_flight.hpp"
 #include "core/log/mcap_writer.hpp"
@@ -46,7 +48,7 @@ class McapFlight {
   enum Channel : std::size_t;
   using Bytes = std::vector<std::uint8_t>;
 
-  void say(Channel channel, const Bytes& cdr);
+  void say(Channel channel, const Bytes& cdr, std::span<const std::uint8_t> more = {});
   void take_poses_until(std::int64_t t_ns);
   void place_autopilot(const TickRecord& row);
   void take_odometry(const OdometryRecord& row);

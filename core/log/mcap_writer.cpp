@@ -86,43 +86,44 @@ std::uint16_t McapWriter::add_channel(std::string_view topic, std::string_view t
   return number;
 }
 
-void McapWriter::write(std::uint16_t channel, McapTimes times, std::span<const std::uint8_t> cdr) {
+void McapWriter::write(std::uint16_t channel, McapTimes times, std::span<const std::uint8_t> cdr,
+                       std::span<const std::uint8_t> more) {
+  if (batch_.empty() && !open_) {
+    Bytes open;
+    put_text(open, kOpen);
+    put_entries(open, {});
+    batch_ = before_;
+    put_record(batch_, McapOp::metadata, open);
+    begin_ = batch_.size();
+  }
   places_.push_back({channel, times.log_ns, batch_.size()});
   Bytes content;
   put_little(content, channel);
   put_little(content, static_cast<std::uint32_t>(numbered_[channel - 1u]++));
   put_little(content, times.log_ns);
   put_little(content, times.publish_ns);
-  put_record(batch_, McapOp::message, content, cdr.size());
+  put_record(batch_, McapOp::message, content, cdr.size() + more.size());
   append(batch_, cdr);
+  append(batch_, more);
 }
 
 bool McapWriter::flush(const McapSink& sink) {
   if (batch_.empty()) return true;
-  Bytes bytes;
-  if (!open_) {
-    Bytes open;
-    put_text(open, kOpen);
-    put_entries(open, {});
-    bytes = before_;
-    put_record(bytes, McapOp::metadata, open);
-  }
-  append(bytes, batch_);
-  if (!sink(at_, bytes)) return false;
+  if (!sink(at_, batch_)) return false;
   if (!open_) {
     crc_ = crc_of(crc_, before_);
     open_ = Chunk{.at = at_ + before_.size()};
     before_.clear();
   }
-  at_ += bytes.size();
   for (const Place& place : places_) {
     put_little(index_[place.channel], place.t_ns);
-    put_little(index_[place.channel], open_->size + place.offset);
+    put_little(index_[place.channel], open_->size + place.offset - begin_);
     open_->span.add(place.t_ns);
     span_.add(place.t_ns);
   }
-  open_->crc = crc_of(open_->crc, batch_);
-  open_->size += batch_.size();
+  at_ += batch_.size();
+  open_->crc = crc_of(open_->crc, std::span(batch_).subspan(begin_));
+  open_->size += batch_.size() - begin_;
   messages_ = numbered_;
   drop();
   if (open_->size >= kChunk) end_chunk(sink);  // or after the next batch
@@ -132,6 +133,7 @@ bool McapWriter::flush(const McapSink& sink) {
 void McapWriter::drop() {
   numbered_ = messages_;
   batch_.clear();
+  begin_ = 0;
   places_.clear();
 }
 

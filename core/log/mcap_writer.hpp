@@ -55,8 +55,9 @@ class McapWriter {
   /// Adds a channel and gives its number. `type`: of its messages, as std_msgs/msg/String; `schema`: the text of its
   /// definition, which is one for all channels of that type. Precondition: no message was written yet.
   std::uint16_t add_channel(std::string_view topic, std::string_view type, std::string_view schema);
-  /// Adds a message to the batch, on a channel that was added; `cdr` with its encapsulation.
-  void write(std::uint16_t channel, McapTimes times, std::span<const std::uint8_t> cdr);
+  /// Adds a message to the batch, on a channel that was added: `cdr` with its encapsulation, and what follows it.
+  void write(std::uint16_t channel, McapTimes times, std::span<const std::uint8_t> cdr,
+             std::span<const std::uint8_t> more = {});
   /// Bytes of the batch.
   std::size_t waiting() const noexcept { return batch_.size(); }
   /// Puts the batch into the file. False: it is not there, and waits still.
@@ -98,9 +99,10 @@ class McapWriter {
   Bytes schema_records_, channel_records_;                     ///< whole records, for the summary
   std::vector<std::uint64_t> messages_, numbered_;             ///< in the file, of each channel; those of the batch too
   Span span_;
-  Bytes before_;  ///< what the next chunk comes behind: the file's beginning, the index of the chunk before
-  Bytes batch_;   ///< messages
-  std::vector<Place> places_;  ///< theirs, counted from the first of them
+  Bytes before_;           ///< what the next chunk comes behind: the file's beginning, the index of the chunk before
+  Bytes batch_;            ///< messages, behind what a chunk begins with if none is open
+  std::size_t begin_ = 0;  ///< bytes of that
+  std::vector<Place> places_;  ///< of the messages in the batch
   std::optional<Chunk> open_;
   std::map<std::uint16_t, Bytes> index_;  ///< of the open chunk by channel: times and places
   std::vector<Chunk> chunks_;

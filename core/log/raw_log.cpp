@@ -43,8 +43,8 @@ tl::expected<RawLog, LogError> raw_log_of(const std::string& path, const std::st
   const std::string_view mcap(reinterpret_cast<const char*>(kMcapMagic.data()), kMcapMagic.size());
   if (kMagic.starts_with(content) || mcap.starts_with(content)) return RawLog{{}, 0};
   if (!content.starts_with(kMagic))
-    return tl::unexpected(LogError{LogError::Kind::bad_data,
-                                   path + ": byte 0: begins neither as an MCAP file nor as a raw log of before"});
+    return tl::unexpected(
+        LogError{LogError::Kind::bad_data, path + ": byte 0: does not begin as a raw log: as MCAP, or as before"});
 
   RawLog log;
   std::uint64_t offset = kMagic.size();

@@ -140,6 +140,39 @@ TEST_F(McapFile, HoldsEachBatchOnceItIsWrittenAndNothingOfOneThatWasNot) {
   expect_those_written(*log, content, false);
 }
 
+TEST_F(McapFile, SaysTheModeAgainAfterWhatWasLostAndDrawsNoMoreThanAMapInTenSeconds) {
+  std::string content;
+  McapFlight flight("test");
+  const auto counts = [&] {
+    EXPECT_TRUE(flight.writer().flush(into(content)));
+    const auto messages = flight.messages();
+    return std::pair(messages.at("/backwash/mode"), messages.at("/backwash/voxels"));
+  };
+  const auto take = [&](RecordKind kind, const auto& record, const std::string& more = {}) {
+    put(kind, record);
+    log_.records.back().bytes.insert(log_.records.back().bytes.end(), more.begin(), more.end());
+    flight.take(log_.records.back());
+  };
+  const auto map = [&] {  // knows a free cube
+    std::string tree("\x03\0", 2);
+    for (int level = 0; level < 10; ++level) tree += std::string("\0\xc0", 2);
+    take(RecordKind::map, MapRecord{0.1, 1, 1}, tree + std::string("\0\x40", 2));
+  };
+  take(RecordKind::tick, TickRecord{});
+  take(RecordKind::tick, TickRecord{});
+  map();
+  map();
+  EXPECT_EQ(counts(), std::pair(std::uint64_t{1}, std::uint64_t{1}));
+  t_ns_ += 11'000'000'000;
+  take(RecordKind::lost, LostRecord{3});
+  EXPECT_EQ(counts(), std::pair(std::uint64_t{1}, std::uint64_t{2}));
+  map();
+  take(RecordKind::tick, TickRecord{});
+  EXPECT_EQ(counts(), std::pair(std::uint64_t{2}, std::uint64_t{2}));
+  EXPECT_TRUE(flight.finish(into(content)));
+  EXPECT_EQ(flight.messages().at("/backwash/voxels"), 3u);
+}
+
 TEST_F(McapFile, WithABitTurnedIsReadWholeOrRefusedByItsByteAndNeverOtherwise) {
   std::size_t refused = 0;
   for (int n = 0; n < 400; ++n) {
