@@ -52,15 +52,14 @@ constexpr std::array<ChannelName, 13> kChannels{{{"/tf", "tf2_msgs", "TFMessage"
                                                  {kAutopilotTopic, "nav_msgs", "Odometry"}}};
 constexpr std::string_view kAutopilotFrame = "autopilot", kAutopilotBody = "autopilot_body";
 
-constexpr std::uint32_t kSentSetpoint = 1;                // of TickRecord::sent
-constexpr std::int64_t kBetweenMaps_ns = 10'000'000'000;  // decoding one takes tens of milliseconds
+constexpr std::uint32_t kSentSetpoint = 1;  // of TickRecord::sent
 
 Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
 
 }  // namespace
 
-McapFlight::McapFlight(std::string_view library, std::size_t largest_map, std::span<const AutopilotPose> autopilot)
-    : writer_(library), largest_map_(largest_map), autopilot_(autopilot), of_autopilot_(!autopilot.empty()) {
+McapFlight::McapFlight(std::string_view library, const DrawnMaps& drawn, std::span<const AutopilotPose> autopilot)
+    : writer_(library), drawn_(drawn), autopilot_(autopilot), of_autopilot_(!autopilot.empty()) {
   for (const auto& [topic, package, type] : kChannels)
     if (topic != kAutopilotTopic || of_autopilot_)
       writer_.add_channel(topic, std::string(package) + "/msg/" + std::string(type),
@@ -82,7 +81,7 @@ void McapFlight::take(const RawRecord& record) {
   if (const auto* row = kind == tick ? payload<TickRecord>(record) : nullptr) take_tick(*row);
   if (kind == offer) take_offer(record);
   const auto* head = kind == RecordKind::map ? payload<MapRecord>(record) : nullptr;
-  if (head && head->accepted && record.bytes.size() - sizeof *head <= largest_map_) map_ = record;
+  if (head && head->accepted && record.bytes.size() - sizeof *head <= drawn_.largest) map_ = record;
   const std::string_view text(reinterpret_cast<const char*>(record.bytes.data()), record.bytes.size());
   if (kind == command || kind == ack) say(kEvents, ros::line(now_ns_, ros::Level::info, text));
   if (kind == failure) say(kEvents, ros::line(now_ns_, ros::Level::error, text));
@@ -90,7 +89,7 @@ void McapFlight::take(const RawRecord& record) {
     mode_.reset();
     shown_ = segment_ == 0;
   }
-  if (map_ && now_ns_ - drawn_ns_ >= kBetweenMaps_ns) show_map();
+  if (map_ && now_ns_ - drawn_ns_ >= drawn_.between_ns) show_map();
 }
 
 bool McapFlight::finish(const McapSink& sink) {
@@ -193,7 +192,7 @@ void McapFlight::show_map() {
 std::map<std::string, std::uint64_t> export_mcap(std::ostream& out, const RawLog& log, std::string_view library,
                                                  std::span<const AutopilotPose> autopilot) {
   constexpr std::size_t kBatch = 1u << 20;
-  McapFlight flight(library, std::numeric_limits<std::size_t>::max(), autopilot);
+  McapFlight flight(library, {}, autopilot);
   // A stream need not go back: what was put last, which holds the whole chunk, waits for the chunk's head.
   std::uint64_t held_at = 0;
   std::vector<std::uint8_t> held;

@@ -22,6 +22,13 @@ namespace backwash::log {
 /// The channel of the autopilot's own poses, where there are any.
 inline constexpr std::string_view kAutopilotTopic = "/autopilot/odometry";
 
+/// Which of the accepted maps are drawn: a voxel takes 24 bytes, 60 times what a map of a building takes as octomap
+/// data.
+struct DrawnMaps {
+  std::size_t largest = std::numeric_limits<std::size_t>::max();  ///< bytes of octomap data
+  std::int64_t between_ns = 0;                                    ///< at least, to the newest since then
+};
+
 /// A raw log as an MCAP file: each record byte for byte on kRawTopic, and beside it what others read, ROS 2 messages of
 /// what the VIO said, what was commanded, each accepted trajectory with its tube, mode and reason, the error against
 /// its bound, commands and answers, the maps. Times are wall time by the first part record; without one (logs of
@@ -29,14 +36,13 @@ inline constexpr std::string_view kAutopilotTopic = "/autopilot/odometry";
 /// far.
 class McapFlight {
  public:
-  /// `library`: who writes it. `largest_map`: bytes of octomap data up to which a map is drawn. `autopilot`: what its
-  /// own log says, rising in time; those within the time of the raw log are written in the frame `autopilot`, and once
-  /// a second of set-points where that frame lies in the map.
-  explicit McapFlight(std::string_view library, std::size_t largest_map = std::numeric_limits<std::size_t>::max(),
+  /// `library`: who writes it. `autopilot`: what its own log says, rising in time; those within the time of the raw log
+  /// are written in the frame `autopilot`, and once a second of set-points where that frame lies in the map.
+  explicit McapFlight(std::string_view library, const DrawnMaps& drawn = {},
                       std::span<const AutopilotPose> autopilot = {});
 
   /// Adds a record, and what follows from it, to the writer's batch. One of records lost says anew what else may be
-  /// lost: mode, reason and trajectory. Maps are drawn no more than one in 10 s, the newest.
+  /// lost: mode, reason and trajectory.
   void take(const RawRecord& record);
   /// Ends the file as McapWriter does.
   bool finish(const McapSink& sink);
@@ -58,7 +64,7 @@ class McapFlight {
   void show_map();
 
   McapWriter writer_;
-  const std::size_t largest_map_;
+  const DrawnMaps drawn_;
   std::span<const AutopilotPose> autopilot_;  ///< those that are still to come
   bool of_autopilot_;                         ///< there were any
   int placed_ = 0;

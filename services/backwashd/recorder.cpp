@@ -97,7 +97,7 @@ bool Recorder::create() {
     while ((fd = open_new()) < 0 && errno == EEXIST && number < kMostNumbers);
   }
   file_ = firmware_bridge::FileDescriptor(fd);
-  mcap_.emplace(kLibrary, kLargestMap);
+  mcap_.emplace(kLibrary, kDrawnMaps);
   written_ = 0;
   told_lost_ = 0;
   if (fd < 0 || begin()) return fd >= 0;

@@ -21,7 +21,7 @@ namespace backwash::daemon {
 /// the other threads append. A full disk, a vanished directory or a disk that does not answer costs records and nothing
 /// else (docs/faults.md row 35): they are counted, a warning is given, and a file that can be written again goes on
 /// with a `lost` record. What waits for the disk is bounded by kMostPending. Whole batches are written or taken back,
-/// so that the file stays readable. Maps beyond kLargestMap it does not draw: `backwash export` does.
+/// so that the file stays readable. Maps beyond kDrawnMaps are left to `backwash export` to draw.
 ///
 /// A file that exists is never opened (row 45). `name` itself is taken if nothing has it, otherwise the next number
 /// above those in its directory: flight.mcap, flight-2.mcap, flight-3.mcap … The file is 0640, and no link is
@@ -33,7 +33,8 @@ class Recorder {
  public:
   static constexpr std::size_t kMostPending = 64u << 20;  ///< bytes of other threads' records that wait for the disk
 
-  static constexpr std::size_t kLargestMap = 256u << 10;  ///< bytes of octomap data: decoded in about 10 ms
+  /// 128 KiB are decoded in about 10 ms and drawn in 8 MB.
+  static constexpr log::DrawnMaps kDrawnMaps{128u << 10, 60'000'000'000};
 
   /// Makes the file. `part_bytes`: size beyond which a part is left. Throws std::runtime_error naming the file if it
   /// cannot be made.

@@ -140,9 +140,9 @@ TEST_F(McapFile, HoldsEachBatchOnceItIsWrittenAndNothingOfOneThatWasNot) {
   expect_those_written(*log, content, false);
 }
 
-TEST_F(McapFile, SaysTheModeAgainAfterWhatWasLostAndDrawsNoMoreThanAMapInTenSeconds) {
+TEST_F(McapFile, SaysTheModeAgainAfterWhatWasLostAndDrawsNoMoreMapsThanItShall) {
   std::string content;
-  McapFlight flight("test");
+  McapFlight flight("test", {.largest = 24, .between_ns = 10'000'000'000});
   const auto counts = [&] {
     EXPECT_TRUE(flight.writer().flush(into(content)));
     const auto messages = flight.messages();
@@ -169,6 +169,7 @@ TEST_F(McapFile, SaysTheModeAgainAfterWhatWasLostAndDrawsNoMoreThanAMapInTenSeco
   map();
   take(RecordKind::tick, TickRecord{});
   EXPECT_EQ(counts(), std::pair(std::uint64_t{2}, std::uint64_t{2}));
+  take(RecordKind::map, MapRecord{0.1, 1, 1}, std::string(25, 'x'));
   EXPECT_TRUE(flight.finish(into(content)));
   EXPECT_EQ(flight.messages().at("/backwash/voxels"), 3u);
 }
