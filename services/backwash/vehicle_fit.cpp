@@ -127,7 +127,7 @@ Verb vehicle_fit_verb(Command& group) {
   auto& command = group.add_subcommand("fit", "Gains, latency and attitude lag of three logs or more, with intervals");
   command
       .add_option("logs", options->logs,
-                  "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.bwlog, .mcap)")
+                  "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.mcap)")
       .required();
   command
       .add_option("--vehicle", options->vehicle,
