@@ -82,8 +82,7 @@ struct Daemon {
 };
 
 /// Reads it, strictly: an unknown, missing or out-of-range key is an error naming file, line, key, value and range.
-/// The tables frames, odometry, map, reach, gpio and adaptation, link.protocol and link.signing_key_file may be left
-/// out: their defaults are above. The key file is read here, so that a start with a bad one ends before any port opens.
+/// The key file is read here, so that a start with a bad one ends before any port opens.
 /// `builtin:backwashd` is the shipped example.
 tl::expected<Daemon, ConfigError> load_daemon(const std::string& path);
 

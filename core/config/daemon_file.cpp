@@ -69,7 +69,7 @@ std::vector<Key> daemon_keys(Daemon& d, Said& said) {
       {"map.sensor_range", &d.map.sensor_range, {0.5, 100}, optional, "m", "points farther away only free the way up to there", "data sheet of the sensor"},
       {"map.max_mib", &d.map.max_mib, {1, 65536}, optional, "MiB", "largest snapshot made of a map, 115 bytes a voxel; with a window more: [A window that moves](#a-window-that-moves)", "memory that is free"},
       {"map.window.occupied", &d.map.window.occupied, {}, with_parent, "", "topic of a mapper's occupied voxels around the vehicle, PointCloud2: [A window that moves](#a-window-that-moves)", "`ros2 topic list`, with rt/ before it, as rt/rog_map/occ"},
-      {"map.window.free", &d.map.window.free, {}, optional, "", "topic of its free voxels; without one the window frees nothing", "the same"},
+      {"map.window.free", &d.map.window.free, {}, optional, "", "topic of its free voxels; without one the window frees nothing"},
       {"map.window.size_x", &d.map.window.size.x(), {1, 200}, with_parent, "m", "edge of the window along x, around the vehicle", "the mapper's, as ROG-Map's visualization_range"},
       {"map.window.size_y", &d.map.window.size.y(), {1, 200}, with_parent, "m", "along y"},
       {"map.window.size_z", &d.map.window.size.z(), {1, 200}, with_parent, "m", "along z"},

@@ -39,6 +39,11 @@ struct Key {
   std::string_view absent = {};  ///< what counts where it is not in the file, if the target's own value does not say so
 };
 
+/// A key that may be there, and is read by another than StrictTable::read().
+inline Key read_elsewhere(std::string_view path, std::string_view meaning = {}) {
+  return {path, {}, {0, 0}, Key::Presence::optional, {}, meaning};
+}
+
 /// The keys as rows of Markdown: | key | unit | range | default | meaning | how |. Their targets hold the defaults.
 std::string markdown(std::span<const Key> keys);
 

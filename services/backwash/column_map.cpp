@@ -139,9 +139,9 @@ tl::expected<ColumnMap, config::ConfigError> read_column_map(const std::string& 
   if (!table) return tl::make_unexpected(table.error());
   std::vector<std::string> paths;
   for (const auto& name : log::mappable_columns()) paths.push_back("columns." + name);
-  std::vector<config::Key> allowed{{"frame.world"}, {"frame.body"}};
-  for (const auto& path_of_column : paths) allowed.push_back({path_of_column});
-  for (auto& key : allowed) key.presence = config::Key::Presence::optional;
+  std::vector<config::Key> allowed;
+  for (const std::string_view key : {"frame.world", "frame.body"}) allowed.push_back(config::read_elsewhere(key));
+  for (const auto& column : paths) allowed.push_back(config::read_elsewhere(column));
   if (auto read = table->read(allowed); !read) return tl::make_unexpected(read.error());
   ColumnMap map;
   const auto one_of = [&](const char* key, const char* usual,

@@ -102,7 +102,7 @@ log::FlightLog read_table(const std::string& path, const std::string& time_colum
 Option add_method(Command& command, reach::Method& target) {
   const std::vector<std::pair<std::string, reach::Method>> methods = {{"tight", reach::Method::tight},
                                                                       {"paper", reach::Method::paper}};
-  return add_choice(command, "--method", target, methods, "tight: exact supports; paper: ellipsoids");
+  return add_choice(command, "--method", target, methods, "tight (default): exact supports; paper: ellipsoids");
 }
 
 Option add_risk(Command& command, std::optional<double>& target) {

@@ -230,7 +230,7 @@ Verb reach_verb(Command& app) {
   command.add_option("--track", options->track, "CSV: t_s, cmd_x_m … cmd_az_mps2, and sigma_xx … sigma_zz or --map")
       .required();
   add_choice(command, "--method", options->kind, kKinds,
-             "tight: exact supports; paper: ellipsoids; chance: left with --probability, no worst case");
+             "tight (default): exact supports; paper: ellipsoids; chance: left with --probability, no worst case");
   command.add_option("--probability", options->probability, "chance only: of leaving the sets, per second of flight");
   add_choice(command, "--loop", options->loop, kLoops, "vehicle (default), continuous (always with paper) or sampled");
   command.add_option("--map", options->map, "OctoMap file or builtin:NAME, for tracks without sigma columns");

@@ -59,6 +59,7 @@ def printed(root: pathlib.Path, build: pathlib.Path) -> dict[str, str]:
     head = "| key | unit | range | default | meaning | how to measure or choose it |\n| --- | --- | --- | --- | --- | --- |\n"
     parts = re.split(r"^== (.*)\n", re.sub(r"docs/(\w+\.md)", r"[\1](\1)", run), flags=re.M)[1:]
     blocks = {name: head + table for name, table in zip(parts[::2], parts[1::2])}
+    blocks["profiles"] = "| profile | header.frame_id | child_frame_id | twist | rate_least, Hz |\n| --- | --- | --- | --- | --- |\n" + parts[-1]
 
     def about(path: str, verb: str, what: str) -> str:
         text = help_of(path, *verb.split())
@@ -80,6 +81,9 @@ def printed(root: pathlib.Path, build: pathlib.Path) -> dict[str, str]:
         verbs += f"- `{verb}`{' `--wait`' if told.pop('return when it is done', '') else ''}: {what}\n"
         of_verbs += listed({m: cell.replace("`", f"`{verb} ", 1) for m, cell in told.items()})
     blocks["backwashctl"] = f"{listed(options(help_of(path)))}\nVerbs; `--wait` returns when it is done:\n\n{verbs}\nOptions of one verb:\n\n{of_verbs}"
+    may = (root / "services/security/documents.cpp").read_text().split("switch (grant.role)")[1].split("topics.insert(topics.end(), grant")[0]
+    blocks["roles"] = "".join(f"- `{role}` may write " + (", ".join(re.findall('"([a-z_/]+)"', body)) or "nothing") + "\n"
+                              for role, body in re.findall(r"case Role::(\w+):(.*?)break;", may, re.S))
     blocks["DDS"] = topics(root)
     return blocks
 
