@@ -36,10 +36,6 @@ Figure map_figure(const sim::Flight& flight, const plan::World& world);
 Figure height_figure(const sim::Flight& flight, const plan::World& world);
 /// w̄ along z at the mean height of a path (field_box.hpp), with the path. Precondition: it holds a point.
 Figure flight_field_figure(std::span<const Vec3> path_W, const plan::World& world);
-/// Error on three axes over time between its upper and lower bounds; the paper's bound dashed.
-Figure error_figure(const sim::Flight& flight);
-/// Clearance over time: true, and of the reachable set.
-Figure clearance_figure(const sim::Flight& flight, const plan::World& world);
 
 /// Corners of {e : |unit(d)·e| ≤ h_d} seen from above, relative to its centre, counter-clockwise, m.
 std::vector<Vec3> octagon(const PerDirection& half_widths);

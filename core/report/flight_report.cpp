@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/report/flight_report.hpp"
 
+#include <algorithm>
+
 #include "core/report/flight_data.hpp"
 #include "core/report/interactive.hpp"
 #include "core/report/page.hpp"
@@ -60,7 +62,12 @@ std::string table(const sim::Flight& flight, const sim::FlightSummary& s) {
 }
 
 /// Its figures, each with what it shows as tables.
-std::vector<Section> sections_of(const sim::Flight& flight, const plan::World& world) {
+std::vector<Section> sections_of(const sim::Flight& flight, const plan::World& world,
+                                 const std::vector<DataTable>& tables) {
+  const auto plotted = [&](const std::string& id, std::vector<TimePlot> plots, const char* title, const char* text) {
+    const auto table = std::ranges::find(tables, id, &DataTable::id);
+    return Section{title, text, plots_figure(*table, plots), std::move(plots), {id}};
+  };
   return {
       {"From above",
        "Obstacles are those that the tube meets in height, body included. The tube was propagated once, when the "
@@ -74,23 +81,17 @@ std::vector<Section> sections_of(const sim::Flight& flight, const plan::World& w
        {},
        {"path", "tube"}},
       field_section(route_of(flight), world),
-      {"Error between its bounds",
-       "Measured position minus the predicted centre. The ellipsoids' bound begins at the moment at which the route "
-       "was "
-       "accepted; where it is drawn, a dotted line marks that.",
-       error_figure(flight),
-       error_plots(true),
-       {"error"}},
-      {"Clearance",
-       "During take-off only what stands beside the vehicle counts.",
-       clearance_figure(flight, world),
-       {{"clearance",
-         "clearance",
-         "clearance",
-         "m",
-         {{"clearance_m", "body to the nearest obstacle, true", "flown"},
-          {"set_clearance_m", "left over by the reachable set", "bound"}}}},
-       {"clearance"}},
+      plotted("error", error_plots(true), "Error between its bounds",
+              "Measured position minus the predicted centre. The ellipsoids' bound begins at the moment at which the "
+              "route was accepted."),
+      plotted("clearance",
+              {{"clearance",
+                "clearance",
+                "clearance",
+                "m",
+                {{"clearance_m", "body to the nearest obstacle, true", "flown"},
+                 {"set_clearance_m", "left over by the reachable set", "bound"}}}},
+              "Clearance", "During take-off only what stands beside the vehicle counts."),
   };
 }
 
@@ -128,7 +129,7 @@ tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, co
   data.scene = flight_scene(flight, world);
   data.field = field_box(world, field_view(world.grid, route_of(flight)));
   page += scene_html(*data.scene);
-  const auto sections = sections_of(flight, world);
+  const auto sections = sections_of(flight, world, data.tables);
   for (const auto& section : sections) data.plots.insert(data.plots.end(), section.plots.begin(), section.plots.end());
   for (const auto& section : sections) {
     if (!section.drawing) return tl::make_unexpected(section.drawing.error());

@@ -141,7 +141,17 @@ const char* line_of(const std::string& kind) {
   return kind == "bound" ? "linewidth 1.5 linecolor '#4a8fce'" : "linewidth 1.2 dashtype 2 linecolor '#8a8a8a'";
 }
 
-/// All plots below each other.
+/// Whether the table has a value of it.
+bool has_values(const DataTable& table, const TimePlot& plot) {
+  return std::ranges::any_of(plot.curves, [&](const Curve& curve) {
+    const auto column = std::ranges::find(table.columns, curve.column) - table.columns.begin();
+    return std::ranges::any_of(table.rows,
+                               [&](const auto& row) { return !std::isnan(row[static_cast<std::size_t>(column)]); });
+  });
+}
+
+}  // namespace
+
 Figure plots_figure(const DataTable& table, const std::vector<TimePlot>& plots) {
   std::ostringstream script;
   script << "$rows << EOD\n";
@@ -166,17 +176,6 @@ Figure plots_figure(const DataTable& table, const std::vector<TimePlot>& plots) 
   script << "unset multiplot\n";
   return draw(script.str(), Format::svg, 1000, 60 + 220 * static_cast<int>(plots.size()));
 }
-
-/// Whether the table has a value of it.
-bool has_values(const DataTable& table, const TimePlot& plot) {
-  return std::ranges::any_of(plot.curves, [&](const Curve& curve) {
-    const auto column = std::ranges::find(table.columns, curve.column) - table.columns.begin();
-    return std::ranges::any_of(table.rows,
-                               [&](const auto& row) { return !std::isnan(row[static_cast<std::size_t>(column)]); });
-  });
-}
-
-}  // namespace
 
 DataTable thinned(DataTable table, std::size_t most) {
   if (table.rows.size() <= most) return table;

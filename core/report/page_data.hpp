@@ -78,6 +78,9 @@ struct PageData {
   std::optional<FieldBox> field;  ///< the page makes the table "field" of its layer
 };
 
+/// Plots of a table over its first column, below each other, drawn by gnuplot.
+Figure plots_figure(const DataTable& table, const std::vector<TimePlot>& plots);
+
 /// Adds a section of plots below each other, drawn by gnuplot, and to `data` its table and plots. A plot that the table
 /// has no value for is none, and the section says so.
 void add_plots(std::vector<Section>& sections, PageData& data, DataTable table, const std::string& title,

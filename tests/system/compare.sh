@@ -4,7 +4,7 @@
 # arguments are refused.
 source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 
-small=(compare --scenes builtin:narrow-gap --flights 8)
+small=(compare --quiet --scenes builtin:narrow-gap --flights 8)
 "$backwash" "${small[@]}" --seed 1 --json --out a.csv --report page.html >a.json 2>stderr || die "failed: $(cat stderr)"
 [[ ! -s stderr ]] || die "stderr is not empty: $(cat stderr)"
 "$backwash" "${small[@]}" --seed 1 --vehicle builtin:quad-7in builtin:quad-5in --out b.csv >table.txt
