@@ -16,15 +16,15 @@ using namespace backwash::study;
 using backwash::kNoSurface;
 using backwash::Vec3;
 
-constexpr std::size_t kFlights = 12, kOfFlight = 24;
+constexpr std::size_t kSeenFlights = 12, kOfFlight = 24;
 
 bool covers(const Estimate& e, double truth) { return e.low <= truth && truth <= e.high; }
 
 /// Flights of which nothing is measured yet.
 Observations flights() {
   Observations seen;
-  seen.flights = kFlights;
-  seen.windows.resize(kFlights * kOfFlight, WindowRow{});
+  seen.flights = kSeenFlights;
+  seen.windows.resize(kSeenFlights * kOfFlight, WindowRow{});
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     auto& w = seen.windows[i];
     w.flight = i / kOfFlight;
