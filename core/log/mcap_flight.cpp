@@ -191,9 +191,8 @@ void McapFlight::show_map() {
 
 std::map<std::string, std::uint64_t> export_mcap(std::ostream& out, const RawLog& log, std::string_view library,
                                                  std::span<const AutopilotPose> autopilot) {
-  constexpr std::size_t kBatch = 1u << 20;
   McapFlight flight(library, {}, autopilot);
-  // A stream need not go back: what was put last, which holds the whole chunk, waits for the chunk's head.
+  // A stream need not go back: what was put last holds a whole chunk, and waits for its head.
   std::uint64_t held_at = 0;
   std::vector<std::uint8_t> held;
   const auto put = [&] {
@@ -211,7 +210,7 @@ std::map<std::string, std::uint64_t> export_mcap(std::ostream& out, const RawLog
   };
   for (const RawRecord& record : log.records) {
     flight.take(record);
-    if (flight.writer().waiting() >= kBatch) flight.writer().flush(sink);
+    if (flight.writer().waiting() >= McapWriter::kChunk) flight.writer().flush(sink);
   }
   flight.finish(sink);
   put();

@@ -13,7 +13,6 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr std::size_t kChunk = 1u << 20;  // bytes at which one is ended
 /// Stands where a chunk's head will: metadata without entries, whose name makes it as long.
 constexpr std::string_view kOpen = "a chunk that was not ended yet  ";
 

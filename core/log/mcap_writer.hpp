@@ -49,6 +49,8 @@ using McapSink = std::function<bool(std::uint64_t at, std::span<const std::uint8
 /// the chunks and of the newest one's messages.
 class McapWriter {
  public:
+  static constexpr std::size_t kChunk = 1u << 20;  ///< bytes at which a chunk is ended
+
   /// `library`: who writes it.
   explicit McapWriter(std::string_view library);
 
@@ -58,8 +60,8 @@ class McapWriter {
   /// Adds a message to the batch, on a channel that was added: `cdr` with its encapsulation, and what follows it.
   void write(std::uint16_t channel, McapTimes times, std::span<const std::uint8_t> cdr,
              std::span<const std::uint8_t> more = {});
-  /// Bytes of the batch.
-  std::size_t waiting() const noexcept { return batch_.size(); }
+  /// Bytes of the batch's messages. As many as kChunk end the chunk that they are put into.
+  std::size_t waiting() const noexcept { return batch_.size() - begin_; }
   /// Puts the batch into the file. False: it is not there, and waits still.
   bool flush(const McapSink& sink);
   /// Leaves the batch out of the file.
