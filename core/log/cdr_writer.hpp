@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string_view>
 #include <type_traits>
 #include <vector>
@@ -27,11 +26,6 @@ class CdrWriter {
     count(text.size() + 1);
     bytes_.insert(bytes_.end(), text.begin(), text.end());
     bytes_.push_back(0);
-  }
-  /// A sequence of octets.
-  void octets(std::span<const std::uint8_t> octets) {
-    count(octets.size());
-    bytes_.insert(bytes_.end(), octets.begin(), octets.end());
   }
   const std::vector<std::uint8_t>& bytes() const noexcept { return bytes_; }
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <string_view>
 
-#include "core/log/mcap_export.hpp"
 #include "core/log/mcap_walk.hpp"
 #include "core/log/mcap_writer.hpp"
 #include "core/log/ros_messages.hpp"
@@ -39,9 +38,8 @@ tl::expected<RawLog, LogError> raw_log_of_mcap(const std::string& path, std::spa
     return tl::unexpected(LogError{LogError::Kind::bad_data, path + ": byte " + std::to_string(end.at) + ": " + what});
   };
   if (!end.wrong.empty()) return wrong(end.wrong);
-  if (!told)
-    return wrong("no channel " + std::string(kRawTopic) + " before it: not of backwash export; give the raw log");
-  if (!end.whole) log.cut_at = end.at;
+  if (!told) return wrong("no channel " + std::string(kRawTopic) + " before it: not a log of backwashd");
+  if (!end.whole && end.at < bytes.size()) log.cut_at = end.at;
   return log;
 }
 

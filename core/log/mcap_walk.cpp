@@ -27,7 +27,10 @@ class Walk {
     std::uint64_t at = kMcapMagic.size();
     while (!end_.whole && end_.wrong.empty()) {
       const auto content = record(file_.substr(at));
-      if (!content) break;
+      if (!content) {
+        at = cut(at);
+        break;
+      }
       take(static_cast<McapOp>(file_[at]), *content, at);
       at += kHead + content->size();
     }
@@ -42,6 +45,28 @@ class Walk {
     const auto length = Octets(bytes.substr(1)).number<std::uint64_t>();
     if (length > bytes.size() - kHead) return std::nullopt;
     return bytes.substr(kHead, length);
+  }
+
+  /// Of a record that is cut short, where it begins. Of a chunk that is not compressed, the messages that are whole are
+  /// taken, and where they end.
+  std::uint64_t cut(std::uint64_t at) {
+    const std::string_view begun = file_.substr(at);
+    if (begun.size() < kHead || static_cast<McapOp>(begun.front()) != McapOp::chunk) return at;
+    Octets fields(begun.substr(kHead));
+    fields.take(8 + 8 + 8 + 4);  // its times, size and checksum
+    const auto compression = fields.text();
+    fields.take(8);
+    if (!fields.good || !compression.empty()) return at;
+    std::string_view messages = fields.rest();
+    while (const auto content = record(messages)) {
+      in_chunk(static_cast<McapOp>(messages.front()), *content, place_of(messages));
+      messages.remove_prefix(kHead + content->size());
+    }
+    return place_of(messages);
+  }
+
+  std::uint64_t place_of(std::string_view bytes) const {
+    return static_cast<std::uint64_t>(bytes.data() - file_.data());
   }
 
   void fail(std::uint64_t at, std::string what) {
@@ -89,7 +114,7 @@ class Walk {
   void records(std::string_view bytes, std::uint32_t crc, std::uint64_t at, bool here) {
     if (!fits(crc, bytes)) return fail(at, "the chunk's checksum does not fit: the file is damaged");
     while (end_.wrong.empty() && !bytes.empty()) {
-      const std::uint64_t place = here ? static_cast<std::uint64_t>(bytes.data() - file_.data()) : at;
+      const std::uint64_t place = here ? place_of(bytes) : at;
       const auto content = record(bytes);
       if (!content) return fail(place, "is no whole record");
       in_chunk(static_cast<McapOp>(bytes.front()), *content, place);

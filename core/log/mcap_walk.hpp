@@ -35,7 +35,8 @@ struct McapEnd {
 };
 
 /// Goes through the records of an MCAP file (https://mcap.dev/spec) from its beginning. No index is asked, so a file
-/// that was cut short gives its whole chunks. Every checksum is. Precondition: is_mcap. Offline.
+/// that was cut short gives its whole messages, of a compressed chunk none. Every checksum of what is whole is.
+/// Precondition: is_mcap. Offline.
 McapEnd walk_mcap(std::string_view file, const McapListener& listener);
 
 }  // namespace backwash::log

@@ -13,7 +13,8 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr std::size_t kChunk = 1u << 20;  // bytes at which one is ended
+/// Stands where a chunk's head will: metadata without entries, whose name makes it as long.
+constexpr std::string_view kOpen = "a chunk that was not ended yet  ";
 
 std::uint32_t crc_of(std::uint32_t before, std::span<const std::uint8_t> bytes) {
   return static_cast<std::uint32_t>(::crc32_z(before, bytes.data(), bytes.size()));
@@ -24,20 +25,20 @@ void put_text(Bytes& to, std::string_view text) {
   to.insert(to.end(), text.begin(), text.end());
 }
 
+void append(Bytes& to, std::span<const std::uint8_t> more) { to.insert(to.end(), more.begin(), more.end()); }
+
 /// The entries of a map or an array behind their length in bytes.
 void put_entries(Bytes& to, const Bytes& entries) {
   put_little(to, static_cast<std::uint32_t>(entries.size()));
-  to.insert(to.end(), entries.begin(), entries.end());
+  append(to, entries);
 }
 
-Bytes record_of(McapOp op, std::span<const std::uint8_t> content) {
-  Bytes record{static_cast<std::uint8_t>(op)};
-  put_little(record, std::uint64_t{content.size()});
-  record.insert(record.end(), content.begin(), content.end());
-  return record;
+/// Adds a record: its content may follow in part, `more` bytes of it.
+void put_record(Bytes& to, McapOp op, const Bytes& content, std::uint64_t more = 0) {
+  to.push_back(static_cast<std::uint8_t>(op));
+  put_little(to, content.size() + more);
+  append(to, content);
 }
-
-void append(Bytes& to, const Bytes& more) { to.insert(to.end(), more.begin(), more.end()); }
 
 }  // namespace
 
@@ -47,38 +48,30 @@ void McapWriter::Span::add(std::uint64_t t_ns) {
   ++messages;
 }
 
-McapWriter::McapWriter(std::ostream& out, std::string_view library) : out_(out) {
-  put(kMcapMagic);
+McapWriter::McapWriter(std::string_view library) : before_(kMcapMagic.begin(), kMcapMagic.end()) {
   Bytes header;
   put_text(header, "ros2");
   put_text(header, library);
-  put_record(McapOp::header, header);
+  put_record(before_, McapOp::header, header);
 }
-
-void McapWriter::put(std::span<const std::uint8_t> bytes) {
-  out_.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  crc_ = crc_of(crc_, bytes);
-  at_ += bytes.size();
-}
-
-void McapWriter::put_record(McapOp op, std::span<const std::uint8_t> content) { put(record_of(op, content)); }
 
 std::uint16_t McapWriter::add_channel(std::string_view topic, std::string_view type, std::string_view schema) {
   auto known = schemas_.find(type);
   if (known == schemas_.end()) {
     known = schemas_.emplace(type, static_cast<std::uint16_t>(schemas_.size() + 1)).first;
-    Bytes content;
+    Bytes content, record;
     put_little(content, known->second);
     put_text(content, type);
     put_text(content, "ros2msg");
     put_text(content, schema);
-    const Bytes record = record_of(McapOp::schema, content);
+    put_record(record, McapOp::schema, content);
     append(schema_records_, record);
-    append(chunk_, record);
+    append(before_, record);
   }
   messages_.push_back(0);
+  numbered_.push_back(0);
   const auto number = static_cast<std::uint16_t>(messages_.size());
-  Bytes content, metadata;
+  Bytes content, metadata, record;
   put_text(metadata, "offered_qos_profiles");  // the profile demands it; empty: those of a reader who asks for none
   put_text(metadata, "");
   put_little(content, number);
@@ -86,60 +79,94 @@ std::uint16_t McapWriter::add_channel(std::string_view topic, std::string_view t
   put_text(content, topic);
   put_text(content, "cdr");
   put_entries(content, metadata);
-  const Bytes record = record_of(McapOp::channel, content);
+  put_record(record, McapOp::channel, content);
   append(channel_records_, record);
-  append(chunk_, record);
+  append(before_, record);
   return number;
 }
 
-void McapWriter::write(std::uint16_t channel, McapTimes times, std::span<const std::uint8_t> cdr) {
+void McapWriter::write(std::uint16_t channel, McapTimes times, std::span<const std::uint8_t> cdr,
+                       std::span<const std::uint8_t> more) {
+  if (batch_.empty() && !open_) {
+    Bytes open;
+    put_text(open, kOpen);
+    put_entries(open, {});
+    batch_ = before_;
+    put_record(batch_, McapOp::metadata, open);
+    begin_ = batch_.size();
+  }
+  places_.push_back({channel, times.log_ns, batch_.size()});
   Bytes content;
-  content.reserve(22 + cdr.size());
   put_little(content, channel);
-  put_little(content, static_cast<std::uint32_t>(messages_[channel - 1u]++));
+  put_little(content, static_cast<std::uint32_t>(numbered_[channel - 1u]++));
   put_little(content, times.log_ns);
   put_little(content, times.publish_ns);
-  content.insert(content.end(), cdr.begin(), cdr.end());
-  places_[channel].push_back({times.log_ns, chunk_.size()});
-  append(chunk_, record_of(McapOp::message, content));
-  chunk_span_.add(times.log_ns);
-  span_.add(times.log_ns);
-  if (chunk_.size() >= kChunk) end_chunk();
+  put_record(batch_, McapOp::message, content, cdr.size() + more.size());
+  append(batch_, cdr);
+  append(batch_, more);
 }
 
-void McapWriter::end_chunk() {
-  if (chunk_.empty()) return;
-  Bytes content;
-  put_little(content, chunk_span_.first_ns);
-  put_little(content, chunk_span_.last_ns);
-  put_little(content, std::uint64_t{chunk_.size()});
-  put_little(content, crc_of(0, chunk_));
+bool McapWriter::flush(const McapSink& sink) {
+  if (batch_.empty()) return true;
+  if (!sink(at_, batch_)) return false;
+  if (!open_) {
+    crc_ = crc_of(crc_, before_);
+    open_ = Chunk{.at = at_ + before_.size()};
+    before_.clear();
+  }
+  for (const Place& place : places_) {
+    put_little(index_[place.channel], place.t_ns);
+    put_little(index_[place.channel], open_->size + place.offset - begin_);
+    open_->span.add(place.t_ns);
+    span_.add(place.t_ns);
+  }
+  at_ += batch_.size();
+  open_->crc = crc_of(open_->crc, std::span(batch_).subspan(begin_));
+  open_->size += batch_.size() - begin_;
+  messages_ = numbered_;
+  drop();
+  if (open_->size >= kChunk) end_chunk(sink);  // or after the next batch
+  return true;
+}
+
+void McapWriter::drop() {
+  numbered_ = messages_;
+  batch_.clear();
+  begin_ = 0;
+  places_.clear();
+}
+
+McapWriter::Bytes McapWriter::head_of(const Chunk& chunk) const {
+  Bytes content, head;
+  put_little(content, chunk.span.first_ns);
+  put_little(content, chunk.span.last_ns);
+  put_little(content, chunk.size);
+  put_little(content, chunk.crc);
   put_text(content, "");  // not compressed
-  put_little(content, std::uint64_t{chunk_.size()});
-  append(content, chunk_);
-  Chunk chunk{std::exchange(chunk_span_, {}), at_, 0, 0, chunk_.size(), {}};
-  put_record(McapOp::chunk, content);
-  chunk.length = at_ - chunk.at;
-  put_message_index(chunk);
-  chunks_.push_back(std::move(chunk));
-  chunk_.clear();
+  put_little(content, chunk.size);
+  put_record(head, McapOp::chunk, content, chunk.size);
+  return head;
 }
 
-void McapWriter::put_message_index(Chunk& chunk) {
-  const std::uint64_t from = at_;
-  for (const auto& [channel, places] : std::exchange(places_, {})) {
-    chunk.index_at[channel] = at_;
-    Bytes content, entries;
-    for (const Place& place : places) put_little(entries, place.t_ns), put_little(entries, place.offset);
+bool McapWriter::end_chunk(const McapSink& sink) {
+  const Bytes head = head_of(*open_);
+  if (!sink(open_->at, head)) return false;
+  crc_ = static_cast<std::uint32_t>(::crc32_combine(crc_of(crc_, head), open_->crc, static_cast<z_off_t>(open_->size)));
+  for (const auto& [channel, entries] : std::exchange(index_, {})) {
+    open_->index_at[channel] = at_ + before_.size();
+    Bytes content;
     put_little(content, channel);
     put_entries(content, entries);
-    put_record(McapOp::message_index, content);
+    put_record(before_, McapOp::message_index, content);
   }
-  chunk.index_length = at_ - from;
+  open_->index_length = before_.size();
+  chunks_.push_back(std::move(*open_));
+  open_.reset();
+  return true;
 }
 
 McapWriter::Bytes McapWriter::statistics() const {
-  Bytes content, counts;
+  Bytes content, counts, record;
   put_little(content, span_.messages);
   put_little(content, static_cast<std::uint16_t>(schemas_.size()));
   put_little(content, static_cast<std::uint32_t>(messages_.size()));
@@ -148,61 +175,63 @@ McapWriter::Bytes McapWriter::statistics() const {
   put_little(content, static_cast<std::uint32_t>(chunks_.size()));
   put_little(content, span_.first_ns);
   put_little(content, span_.last_ns);
-  for (std::size_t n = 0; n < messages_.size(); ++n)
-    put_little(counts, static_cast<std::uint16_t>(n + 1)), put_little(counts, messages_[n]);
+  for (std::size_t n = 0; n < messages_.size(); ++n) {
+    put_little(counts, static_cast<std::uint16_t>(n + 1));
+    put_little(counts, messages_[n]);
+  }
   put_entries(content, counts);
-  return content;
+  put_record(record, McapOp::statistics, content);
+  return record;
 }
 
-std::uint64_t McapWriter::put_summary() {
-  Bytes index;
+McapWriter::Bytes McapWriter::end_of_file() const {
+  Bytes bytes = before_, end;
+  put_little(end, crc_of(crc_, before_));
+  put_record(bytes, McapOp::data_end, end);
+  const std::size_t summary = bytes.size();
+  Bytes chunk_index, offsets;
   for (const Chunk& chunk : chunks_) {
     Bytes content, index_at;
     put_little(content, chunk.span.first_ns);
     put_little(content, chunk.span.last_ns);
     put_little(content, chunk.at);
-    put_little(content, chunk.length);
-    for (const auto& [channel, at] : chunk.index_at) put_little(index_at, channel), put_little(index_at, at);
+    put_little(content, head_of(chunk).size() + chunk.size);
+    for (const auto& [channel, at] : chunk.index_at) {
+      put_little(index_at, channel);
+      put_little(index_at, at);
+    }
     put_entries(content, index_at);
     put_little(content, chunk.index_length);
     put_text(content, "");
     put_little(content, chunk.size);
     put_little(content, chunk.size);
-    append(index, record_of(McapOp::chunk_index, content));
+    put_record(chunk_index, McapOp::chunk_index, content);
   }
-  Bytes offsets;
   const std::pair<McapOp, const Bytes> groups[] = {{McapOp::schema, schema_records_},
                                                    {McapOp::channel, channel_records_},
-                                                   {McapOp::chunk_index, index},
-                                                   {McapOp::statistics, record_of(McapOp::statistics, statistics())}};
+                                                   {McapOp::chunk_index, chunk_index},
+                                                   {McapOp::statistics, statistics()}};
   for (const auto& [op, records] : groups) {
     if (records.empty()) continue;
     Bytes content{static_cast<std::uint8_t>(op)};
-    put_little(content, at_);
+    put_little(content, at_ + bytes.size());
     put_little(content, std::uint64_t{records.size()});
-    append(offsets, record_of(McapOp::summary_offset, content));
-    put(records);
+    put_record(offsets, McapOp::summary_offset, content);
+    append(bytes, records);
   }
-  const std::uint64_t offsets_at = at_;
-  put(offsets);
-  return offsets_at;
+  const std::uint64_t offsets_at = at_ + bytes.size();
+  append(bytes, offsets);
+  Bytes places;
+  put_little(places, at_ + summary);
+  put_little(places, offsets_at);
+  put_record(bytes, McapOp::footer, places, sizeof(std::uint32_t));
+  put_little(bytes, crc_of(0, std::span(bytes).subspan(summary)));
+  append(bytes, kMcapMagic);
+  return bytes;
 }
 
-void McapWriter::finish() {
-  end_chunk();
-  Bytes end;
-  put_little(end, crc_);
-  put_record(McapOp::data_end, end);
-  crc_ = 0;
-  const std::uint64_t summary_at = at_;
-  const std::uint64_t offsets_at = put_summary();
-  Bytes footer{static_cast<std::uint8_t>(McapOp::footer)};
-  put_little(footer, std::uint64_t{8 + 8 + 4});
-  put_little(footer, summary_at);
-  put_little(footer, offsets_at);
-  put_little(footer, crc_of(crc_, footer));
-  put(footer);
-  put(kMcapMagic);
+bool McapWriter::finish(const McapSink& sink) {
+  return flush(sink) && (!open_ || end_chunk(sink)) && sink(at_, end_of_file());
 }
 
 }  // namespace backwash::log

@@ -2,12 +2,14 @@
 #include "core/log/raw_log.hpp"
 
 #include <algorithm>
+#include <fstream>
 #include <iterator>
 #include <string_view>
 
 #include "core/log/little_endian.hpp"
 #include "core/log/log_file.hpp"
 #include "core/log/mcap_reader.hpp"
+#include "core/log/mcap_writer.hpp"
 
 namespace backwash::log {
 
@@ -33,20 +35,20 @@ std::optional<RawRecord> raw_record(std::span<const std::uint8_t> bytes) {
   return RawRecord{*header, {body.begin(), body.end()}};
 }
 
-tl::expected<RawLog, LogError> read_raw_log(const std::string& path) {
-  const auto content = read_log_file(path, files::kLargestLog, "a raw log");
-  if (!content) return tl::unexpected(content.error());
-  const std::span bytes(reinterpret_cast<const std::uint8_t*>(content->data()), content->size());
+namespace {
+
+tl::expected<RawLog, LogError> raw_log_of(const std::string& path, const std::string& content) {
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(content.data()), content.size());
   if (is_mcap(bytes)) return raw_log_of_mcap(path, bytes);
-  if (content->size() < kMagic.size() && kMagic.starts_with(*content)) return RawLog{{}, 0};
-  if (!content->starts_with(kMagic))
+  const std::string_view mcap(reinterpret_cast<const char*>(kMcapMagic.data()), kMcapMagic.size());
+  if (kMagic.starts_with(content) || mcap.starts_with(content)) return RawLog{{}, 0};
+  if (!content.starts_with(kMagic))
     return tl::unexpected(
-        LogError{LogError::Kind::bad_data,
-                 path + ": byte 0: does not begin as a raw log of this version of backwashd, nor as an MCAP file"});
+        LogError{LogError::Kind::bad_data, path + ": byte 0: does not begin as a raw log: as MCAP, or as before"});
 
   RawLog log;
   std::uint64_t offset = kMagic.size();
-  while (content->size() - offset >= sizeof(RecordHeader)) {
+  while (content.size() - offset >= sizeof(RecordHeader)) {
     const auto here = bytes.subspan(offset);
     if (!header_at(here))
       return tl::unexpected(LogError{LogError::Kind::bad_data,
@@ -57,8 +59,26 @@ tl::expected<RawLog, LogError> read_raw_log(const std::string& path) {
     offset += sizeof record->header + record->bytes.size();
     log.records.push_back(*std::move(record));
   }
-  if (offset < content->size()) log.cut_at = offset;
+  if (offset < content.size()) log.cut_at = offset;
   return log;
+}
+
+}  // namespace
+
+tl::expected<RawLog, LogError> read_raw_log(const std::string& path) {
+  const auto content = read_log_file(path, files::kLargestLog, "a raw log");
+  return content ? raw_log_of(path, *content) : tl::unexpected(content.error());
+}
+
+std::optional<PartRecord> part_of(const std::string& path) {
+  std::string begin(std::size_t{64} << 10, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<std::size_t>(file.gcount()));
+  auto log = raw_log_of(path, begin);
+  if (!log || log->records.empty()) return std::nullopt;
+  log->records.resize(1);
+  return last_part(*log);
 }
 
 std::optional<PartRecord> last_part(const RawLog& log) {

@@ -15,8 +15,12 @@
 
 namespace backwash::log {
 
-/// The daemon's raw log: every input and output in the order in which the daemon saw it. A file is the line
-/// kRawLogMagic, then records: RecordHeader and `size` bytes, little-endian, no padding between records.
+/// The daemon's raw log: every input and output in the order in which the daemon saw it. A file is MCAP
+/// (core/log/mcap_flight.hpp): its channel kRawTopic holds the records, each RecordHeader and `size` bytes,
+/// little-endian, as a std_msgs/msg/UInt8MultiArray.
+inline constexpr char kRawTopic[] = "/backwash/raw_log";
+
+/// A file of before version 0.1.0: this line, then the records without padding. Version 0.1 still reads it.
 inline constexpr char kRawLogMagic[] = "backwash raw log 3\n";
 
 enum class RecordKind : std::uint32_t {
@@ -190,13 +194,16 @@ struct RawLog {
 /// The record that these bytes begin with. Nothing: they begin with none, or with part of one.
 std::optional<RawRecord> raw_record(std::span<const std::uint8_t> bytes);
 
-/// Reads a raw log, or the one in an MCAP file of `backwash export` (core/log/mcap_reader.hpp). Errors: not_found;
-/// bad_data with the byte offset.
+/// Reads a raw log, whatever its name: its first bytes say what it is. Errors: not_found; bad_data with the byte
+/// offset.
 tl::expected<RawLog, LogError> read_raw_log(const std::string& path);
 
 /// Reads the parts of one log, in their order, as one: what a later part repeats of an earlier one is left out. Errors:
 /// those of read_raw_log; bad_data naming a file that is not the part that comes next, or that is cut short before one.
 tl::expected<RawLog, LogError> read_raw_logs(std::span<const std::string> paths);
+
+/// Which part a file is, by its first record: reads its beginning alone. Nothing: it does not say, or is no raw log.
+std::optional<PartRecord> part_of(const std::string& path);
 
 /// Which part a log ends with. Nothing: it is of a daemon that wrote no parts.
 std::optional<PartRecord> last_part(const RawLog& log);

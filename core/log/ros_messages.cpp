@@ -220,11 +220,11 @@ Bytes line(std::int64_t stamp_ns, Level level, std::string_view text) {
   return cdr.bytes();
 }
 
-Bytes octets(std::span<const std::uint8_t> octets) {
+Bytes octets(std::size_t octets) {
   CdrWriter cdr;
   cdr.count(0);                  // dimensions
   cdr.number(std::uint32_t{0});  // offset
-  cdr.octets(octets);
+  cdr.count(octets);
   return cdr.bytes();
 }
 

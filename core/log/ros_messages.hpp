@@ -55,8 +55,9 @@ Bytes text(std::string_view text);
 /// rcl_interfaces/Log: one line for the operator.
 enum class Level : std::uint8_t { info = 20, warning = 30, error = 40 };
 Bytes line(std::int64_t stamp_ns, Level level, std::string_view text);
-/// std_msgs/UInt8MultiArray, and the octets of one again; nothing if the bytes are no such message.
-Bytes octets(std::span<const std::uint8_t> octets);
+/// std_msgs/UInt8MultiArray as far as its octets, and the octets of one again; nothing if the bytes are no such
+/// message.
+Bytes octets(std::size_t octets);
 std::optional<std::span<const std::uint8_t>> octets_of(std::span<const std::uint8_t> message) noexcept;
 
 }  // namespace backwash::log::ros
