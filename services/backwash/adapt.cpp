@@ -135,7 +135,7 @@ Verb adapt_verb(Command& app) {
   auto& command = app.add_subcommand(
       "adapt",
       "By how much a flight's errors were larger than promised, by class of air, as it would be known in flight");
-  command.add_option("logs", options->logs, "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.bwlog)");
+  command.add_option("logs", options->logs, "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.mcap)");
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME: gains, delays, r0");
   command.add_option("--map", options->map,
                      "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");

@@ -20,7 +20,7 @@ struct FlownAir {
   bool accelerometer = true;           ///< logged; nothing is taken from it
 };
 
-/// Reads a flight log (CSV, ULog, DataFlash) or the daemon's raw log (.bwlog). `grid` may be null: the map in the
+/// Reads a flight log (CSV, ULog, DataFlash) or the daemon's raw log (.mcap). `grid` may be null: the map in the
 /// raw log, else no surface but the floor z = 0. Throws Failure: 66 for what does not exist, 65 for a log that cannot
 /// be used.
 FlownAir read_air(const std::string& path, const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid);

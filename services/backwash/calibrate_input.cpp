@@ -56,7 +56,7 @@ void add_campaign_options(Command& command, CampaignFiles& files) {
             const auto map = files.maps.empty() ? std::nullopt : std::optional(files.maps.size() - 1);
             for (const auto& log : logs) files.logs.push_back({log, map});
           },
-          "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.bwlog, .mcap)")
+          "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.mcap)")
       .trigger_on_parse();
 }
 

@@ -2,7 +2,7 @@
 #include <cinttypes>
 #include <cstdio>
 
-#include "core/log/mcap_export.hpp"
+#include "core/log/mcap_flight.hpp"
 #include "core/log/raw_flight.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
@@ -50,16 +50,18 @@ int run(const ExportOptions& options) {
 Verb export_verb(Command& app) {
   auto options = std::make_shared<ExportOptions>();
   auto& command =
-      app.add_subcommand("export", "A raw log as MCAP, which Foxglove and rosbag2 open, or as a flight log");
+      app.add_subcommand("export", "A raw log as a flight log (CSV); its parts, or one of before, as one MCAP");
   command.add_option("logs", options->logs, "raw log of backwashd, or parts of one in their order").required();
-  command.add_option("--mcap", options->mcap,
-                     "MCAP file to write; report, replay and the others read it as the raw log");
+  command.add_option(
+      "--mcap", options->mcap,
+      "MCAP file to write, as the daemon writes it: parts joined, the format of before too, large maps drawn");
   command.add_option("--csv", options->csv, "flight log to write, CSV");
   command.add_flag("--json", options->json, "one JSON object on stdout");
   command.add_flag("--force", options->force, "overwrite files that exist");
   command.footer(
-      "Example:\n  backwash export flight.bwlog --mcap flight.mcap\n"
-      "  ros2 bag play flight.mcap");
+      "A raw log is an MCAP file, which Foxglove and rosbag2 open as it lies there.\n"
+      "Example:\n  backwash export flight.mcap --csv flight.csv\n"
+      "  backwash export flight.mcap flight-2.mcap --mcap whole.mcap");
   return {&command, [options] { return run(*options); }};
 }
 

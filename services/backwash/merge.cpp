@@ -5,7 +5,7 @@
 #include "core/log/autopilot_flight.hpp"
 #include "core/log/dataflash.hpp"
 #include "core/log/log_file.hpp"
-#include "core/log/mcap_export.hpp"
+#include "core/log/mcap_flight.hpp"
 #include "core/log/ulog.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
@@ -96,7 +96,7 @@ Verb merge_verb(Command& app) {
   command.add_option("-o,--out", options->out, "MCAP file to write").required();
   command.add_flag("--json", options->json, "one JSON object on stdout");
   command.add_flag("--force", options->force, "overwrite a file that exists");
-  command.footer("Example:\n  backwash merge flight.bwlog fc.ulg -o both.mcap");
+  command.footer("Example:\n  backwash merge flight.mcap fc.ulg -o both.mcap");
   return {&command, [options] { return run(*options); }};
 }
 

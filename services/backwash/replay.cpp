@@ -79,7 +79,7 @@ Verb replay_verb(Command& app) {
       "compared bit for bit: mode, reason, set-point in both frames, what was asked to be sent, the set and the "
       "verdict.\n"
       "Exit code 0: all equal; 1: something differs or is missing; 65: the log is damaged.\nExample:\n"
-      "  backwash replay --log flight.bwlog --json");
+      "  backwash replay --log flight.mcap --json");
   return {&command, [options] { return run(*options); }};
 }
 

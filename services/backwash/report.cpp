@@ -82,7 +82,7 @@ Verb report_verb(Command& app) {
   command.footer(
       "Any raw log: several take-offs and routes, holds, refusals, one that never took off or was cut short.\n"
       "Judged by the sets that the daemon judged by. The exit codes of fly.\nExample:\n"
-      "  backwash report --log flight.bwlog --truth truth.csv --out flight.html");
+      "  backwash report --log flight.mcap --truth truth.csv --out flight.html");
   return {&command, [options] { return run(*options); }};
 }
 

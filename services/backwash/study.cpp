@@ -264,7 +264,7 @@ Verb study_verb(Command& app) {
   command.add_option("--model", options->model, "model file or builtin:NAME").capture_default_str();
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME");
   command.add_option("logs,--log", options->logs,
-                     "flight logs, one flight each: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.bwlog, .mcap)");
+                     "flight logs, one flight each: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.mcap)");
   command.add_flag("--rows", options->rows,
                    "prints what a study keeps of each log as a line of JSON, and nothing else");
   command.add_option("--from", options->from, "such lines, in order, in place of logs").type_name("FILE");

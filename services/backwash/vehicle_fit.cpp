@@ -122,9 +122,7 @@ int fit_vehicle(const VehicleFitOptions& options) {
 Verb vehicle_fit_verb(Command& group) {
   auto options = std::make_shared<VehicleFitOptions>();
   auto& command = group.add_subcommand("fit", "Gains, latency and attitude lag of three logs or more, with intervals");
-  command
-      .add_option("logs", options->logs,
-                  "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.bwlog, .mcap)")
+  command.add_option("logs", options->logs, "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.mcap)")
       .required();
   command
       .add_option("--vehicle", options->vehicle,

@@ -179,12 +179,6 @@ struct FreshPort {
   mutable firmware_bridge::Port port;
 };
 
-/// Anything else for the raw log.
-struct BulkRecord {
-  log::RecordHeader header{};
-  std::vector<std::uint8_t> bytes;
-};
-
 /// What the mission asks the planner for. It plans in the newest world.
 struct PlanJob {
   enum class Kind { takeoff, go_to, brake } kind = Kind::takeoff;

@@ -45,9 +45,9 @@ auto made(ExitCode code, Make&& make) {
   }
 }
 
-std::int64_t part_bytes(const config::Daemon& daemon) {
+std::uint64_t part_bytes(const config::Daemon& daemon) {
   constexpr double kMib = 1 << 20;
-  return static_cast<std::int64_t>(daemon.log.max_mib * kMib);
+  return static_cast<std::uint64_t>(daemon.log.max_mib * kMib);
 }
 
 /// A port that is missing or busy may be plugged in, or its simulator started, later: the link watch goes on trying.

@@ -27,6 +27,7 @@ constexpr std::uint64_t kFloor = 64u << 20;           // bytes that others on th
 constexpr std::uint64_t kFloorShare = 20;             // one part in so many of it
 constexpr std::size_t kChunk = 1u << 20;              // bytes written at once
 constexpr int kMostNumbers = 1'000'000;
+constexpr std::string_view kLibrary = "backwashd";
 
 std::string numbered(const fs::path& name, int number) {
   return (name.parent_path() / (name.stem().string() + "-" + std::to_string(number) + name.extension().string()))
@@ -46,12 +47,10 @@ std::int64_t wall_clock_ns() {
   return duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count();
 }
 
-/// Adds a record to others.
-void put_record(std::vector<std::uint8_t>& to, const log::RecordHeader& header, const std::uint8_t* bytes) {
-  const std::size_t at = to.size();
-  to.resize(at + sizeof header + header.size);
-  std::memcpy(to.data() + at, &header, sizeof header);
-  std::copy_n(bytes, header.size, to.data() + at + sizeof header);
+template <typename T>
+log::RawRecord record_of(std::int64_t t_ns, log::RecordKind kind, const T& content) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&content);
+  return {{t_ns, kind, sizeof content}, {bytes, bytes + sizeof content}};
 }
 
 /// The highest N of the files STEM-N.EXTENSION beside `name`; 1 if there is none.
@@ -73,7 +72,7 @@ int highest_number(const fs::path& name) {
 
 }  // namespace
 
-Recorder::Recorder(const std::string& name, std::int64_t part_bytes)
+Recorder::Recorder(const std::string& name, std::uint64_t part_bytes)
     : name_(name), part_bytes_(part_bytes), log_(wall_clock_ns()), path_(name) {
   if (!create())
     throw std::runtime_error(name + ": raw log cannot be created: " + std::strerror(errno) +
@@ -98,6 +97,7 @@ bool Recorder::create() {
     while ((fd = open_new()) < 0 && errno == EEXIST && number < kMostNumbers);
   }
   file_ = firmware_bridge::FileDescriptor(fd);
+  mcap_.emplace(kLibrary, kDrawnMaps);
   written_ = 0;
   told_lost_ = 0;
   if (fd < 0 || begin()) return fd >= 0;
@@ -107,40 +107,38 @@ bool Recorder::create() {
   return false;
 }
 
-/// What every file begins with: its first line, which part it is, and what an earlier part holds of the flight's world.
+/// What every file begins with: which part it is, and what an earlier part holds of the flight's world.
 bool Recorder::begin() {
-  const std::string_view magic(log::kRawLogMagic);
-  if (!write({magic.begin(), magic.end()})) return false;
-  std::vector<std::uint8_t> bytes;
   const std::int64_t now = now_ns();
   const log::PartRecord part{log_, wall_clock_ns() - now, part_ + 1, static_cast<std::uint32_t>(kept_.size())};
-  put_record(bytes, {now, log::RecordKind::part, sizeof part}, reinterpret_cast<const std::uint8_t*>(&part));
-  for (const auto& [kind, record] : kept_) bytes.insert(bytes.end(), record.begin(), record.end());
-  if (!write(bytes)) return false;
+  mcap_->take(record_of(now, log::RecordKind::part, part));
+  for (const auto& [kind, record] : kept_) mcap_->take(record);
+  if (!mcap_->writer().flush(sink_)) return false;
   begun_ = written_;
   ++part_;
   return true;
 }
 
-void Recorder::keep(const log::RecordHeader& header, const std::uint8_t* bytes) {
-  if (header.kind != log::RecordKind::constants && header.kind != log::RecordKind::map) return;
-  if (log::MapRecord map; header.kind == log::RecordKind::map) {
-    if (header.size < sizeof map) return;
-    std::memcpy(&map, bytes, sizeof map);
-    if (!map.accepted) return;
-  }
-  auto& kept = kept_[header.kind];
-  kept.clear();
-  put_record(kept, header, bytes);
+void Recorder::keep(const log::RawRecord& record) {
+  const auto kind = record.header.kind;
+  const auto* map = kind == log::RecordKind::map ? log::payload<log::MapRecord>(record) : nullptr;
+  if (kind == log::RecordKind::constants || (map && map->accepted)) kept_[kind] = record;
 }
 
 /// The next part, if this one is large enough and its last tick commanded nothing. One that cannot be made is looked
 /// for as one that has vanished.
 void Recorder::leave_part() {
-  if (written_ < part_bytes_ || mode_ != static_cast<std::uint32_t>(Mode::passive)) return;
+  if (written_ - begun_ < part_bytes_ || mode_ != static_cast<std::uint32_t>(Mode::passive)) return;
+  finish();
   if (::fdatasync(file_.get()) != 0) spdlog::warn("{}: not on the disk yet: {}", path_, std::strerror(errno));
   const std::string before = path_;
   if (create()) spdlog::info("{} is full; the log goes on in {}", before, path_);
+}
+
+/// Ends the file with its index. Without, as a kill leaves it, readers go through it from its beginning.
+void Recorder::finish() {
+  if (file_.get() >= 0 && written_ > begun_ && !mcap_->finish(sink_))
+    spdlog::warn("{}: has no index: {}", path_, std::strerror(errno));
 }
 
 bool Recorder::still_there() const {
@@ -150,8 +148,9 @@ bool Recorder::still_there() const {
          ours.st_dev == named.st_dev;
 }
 
-bool Recorder::write(const std::vector<std::uint8_t>& bytes) {
+bool Recorder::write(std::uint64_t at, std::span<const std::uint8_t> bytes) {
   if (!room_for(file_.get(), bytes.size())) return errno = ENOSPC, false;
+  if (::lseek(file_.get(), static_cast<::off_t>(at), SEEK_SET) < 0) return false;
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t n = ::write(file_.get(), bytes.data() + done, bytes.size() - done);
@@ -159,14 +158,13 @@ bool Recorder::write(const std::vector<std::uint8_t>& bytes) {
     if (n <= 0) {
       // Part of a batch would hide everything behind it.
       const int why = errno;
-      (void)!::ftruncate(file_.get(), written_);
-      ::lseek(file_.get(), written_, SEEK_SET);
+      (void)!::ftruncate(file_.get(), static_cast<::off_t>(written_));
       errno = why;
       return false;
     }
     done += static_cast<std::size_t>(n);
   }
-  written_ += static_cast<std::int64_t>(bytes.size());
+  written_ = std::max(written_, at + bytes.size());
   return true;
 }
 
@@ -178,7 +176,7 @@ void Recorder::append(log::RecordKind kind, std::span<const std::uint8_t> bytes)
     spdlog::warn("{}: the disk does not follow; the flight goes on, records are lost", name_);
     return;
   }
-  BulkRecord record{{now_ns(), kind, static_cast<std::uint32_t>(bytes.size())}, {bytes.begin(), bytes.end()}};
+  log::RawRecord record{{now_ns(), kind, static_cast<std::uint32_t>(bytes.size())}, {bytes.begin(), bytes.end()}};
   const std::lock_guard lock(mutex_);
   pending_.push_back(std::move(record));
 }
@@ -187,23 +185,18 @@ void Recorder::append(log::RecordKind kind, const std::string& text) {
   append(kind, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
 }
 
-void Recorder::put(const log::RecordHeader& header, const std::uint8_t* bytes) {
-  put_record(batch_, header, bytes);
-  keep(header, bytes);
-}
-
-void Recorder::put_control(const ControlRecord& record) {
-  put(record.header, record.bytes.data());
-  ++in_batch_;
-  if (record.header.kind != log::RecordKind::tick) return;
-  log::TickRecord tick;
-  std::memcpy(&tick, record.bytes.data(), sizeof tick);
-  if (std::exchange(mode_, tick.mode) != tick.mode) sync_due_ = true;
+void Recorder::put(log::RawRecord record) {
+  keep(record);
+  const auto* tick = record.header.kind == log::RecordKind::tick ? log::payload<log::TickRecord>(record) : nullptr;
+  if (tick && std::exchange(mode_, tick->mode) != tick->mode) sync_due_ = true;
+  batch_bytes_ += sizeof record.header + record.bytes.size();
+  batch_.push_back(std::move(record));
 }
 
 void Recorder::fail(const char* why) {
-  lost_ += std::exchange(in_batch_, 0);
+  lost_ += batch_.size();
   batch_.clear();
+  batch_bytes_ = 0;
   if (!std::exchange(failing_, true)) spdlog::warn("{}: {}; the flight goes on, records are lost", path_, why);
 }
 
@@ -225,40 +218,45 @@ bool Recorder::open_again(std::int64_t now) {
 }
 
 void Recorder::write_batch(std::uint64_t lost_in_ring) {
-  if (in_batch_ == 0) return;
+  if (batch_.empty()) return;
   const std::int64_t now = now_ns();
   if (!open_again(now)) return fail("is gone");
   const log::LostRecord lost{lost_ + lost_in_ring};
-  if (lost.records != told_lost_) {
-    const std::vector<std::uint8_t> rest = std::exchange(batch_, {});
-    put({now, log::RecordKind::lost, sizeof lost}, reinterpret_cast<const std::uint8_t*>(&lost));
-    batch_.insert(batch_.end(), rest.begin(), rest.end());
+  if (lost.records != told_lost_) mcap_->take(record_of(now, log::RecordKind::lost, lost));
+  for (const log::RawRecord& record : batch_) mcap_->take(record);
+  if (!mcap_->writer().flush(sink_)) {
+    mcap_->writer().drop();
+    return fail(std::strerror(errno));
   }
-  if (!write(batch_)) return fail(std::strerror(errno));
   told_lost_ = lost.records;
-  in_batch_ = 0;
   batch_.clear();
+  batch_bytes_ = 0;
   if (std::exchange(failing_, false)) spdlog::warn("{}: written again after {} records were lost", path_, lost.records);
   leave_part();
 }
 
 void Recorder::drain(Channels& channels) {
   const auto when_full = [&] {
-    if (batch_.size() > kChunk) write_batch(channels.records_lost());
+    if (batch_bytes_ > kChunk) write_batch(channels.records_lost());
   };
-  while (const auto record = channels.control_log.pop()) put_control(*record), when_full();
-  while (const auto record = channels.command_log.pop()) put_control(*record), when_full();
-  std::vector<BulkRecord> bulk;
+  const auto control = [&](auto& ring) {
+    while (const auto record = ring.pop()) {
+      put({record->header, {record->bytes.begin(), record->bytes.begin() + record->header.size}});
+      when_full();
+    }
+  };
+  control(channels.control_log);
+  control(channels.command_log);
+  std::vector<log::RawRecord> bulk;
   {
     const std::lock_guard lock(mutex_);
     bulk.swap(pending_);
   }
-  for (BulkRecord& record : bulk) {
-    put(record.header, record.bytes.data());
-    ++in_batch_;
+  for (log::RawRecord& record : bulk) {
+    const std::size_t bytes = sizeof record.header + record.bytes.size();
+    put(std::move(record));
     when_full();
-    pending_bytes_ -= sizeof record.header + record.bytes.size();
-    record.bytes = {};
+    pending_bytes_ -= bytes;
   }
   write_batch(channels.records_lost());
   if (std::exchange(sync_due_, false) && file_.get() >= 0 && ::fdatasync(file_.get()) != 0)
@@ -271,6 +269,7 @@ void Recorder::run(Channels& channels, const std::atomic<bool>& end) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   drain(channels);
+  finish();
 }
 
 }  // namespace backwash::daemon

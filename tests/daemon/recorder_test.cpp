@@ -49,7 +49,7 @@ TEST_F(RecorderFault, AFullDiskLosesWholeBatchesAndTheLogSaysHowManyOnceItCanBeW
   rlimit before{};
   ::getrlimit(RLIMIT_FSIZE, &before);
   ::signal(SIGXFSZ, SIG_IGN);
-  const rlimit full{std::filesystem::file_size(path_) + 1000, before.rlim_max};
+  const rlimit full{std::filesystem::file_size(path_) + 1400, before.rlim_max};
   ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &full), 0);
   put(50);  // room for eight of them
   recorder.drain(*channels_);

@@ -114,7 +114,7 @@ def wrong_in_plotjuggler(name: str, text: str, types: dict[str, str], idl: dict)
 
 
 def wrong_in_recorded(layout: dict, interfaces: str, idl: dict) -> list[str]:
-    """The layout for files of backwash export: by its table of topics, and members of ROS 2's types."""
+    """The layout for raw logs: by its table of topics, and members of ROS 2's types."""
     types = types_of_recording(interfaces)
     panels = layout["configById"]
     wrong = [] if sorted(placed(layout["layout"])) == sorted(panels) else ["foxglove: panels and places of the recorded one differ"]

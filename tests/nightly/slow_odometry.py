@@ -6,24 +6,18 @@ import pathlib
 import struct
 import sys
 
-MAGIC, OFFER, TICK = b"backwash raw log 3\n", 12, 8
+sys.path.append(str(pathlib.Path(__file__).parent.parent / "system"))
+from raw_log import TICK, records
+
+OFFER = 12
 HEAD, COMMAND, SET = 10, 10, 16  # doubles
-
-
-def records(path):
-    data = path.read_bytes()
-    at = len(MAGIC)
-    while at + 16 <= len(data):
-        _, kind, size = struct.unpack_from("<qII", data, at)
-        yield kind, data[at + 16:at + 16 + size]
-        at += 16 + size
 
 
 def route_sets(path):
     """Half widths along y (m) of the route that was offered last, from where it is begun on, and the clearance's place."""
     tube, commands, first = [], [], None
     offers = {}
-    for kind, body in records(path):
+    for _, kind, body in records(path):
         if kind == OFFER:
             numbers = struct.unpack(f"<{len(body) // 8}d", body)
             count, sets = int(numbers[7]), int(numbers[8])

@@ -168,6 +168,6 @@ assert port.was_opened(), "the far end cannot tell an opened port"
 assert made == work + "/flight-%d.bwlog" % (len(before) + 1), (made, list(before))
 after = logs()
 assert all(after[name] == text for name, text in before.items()), "an earlier log was touched"
-assert after[os.path.basename(made)].startswith(b"backwash raw log") and os.stat(made).st_mode & 0o777 == 0o640
+assert after[os.path.basename(made)].startswith(b"\x89MCAP0\r\n") and os.stat(made).st_mode & 0o777 == 0o640
 print("exit 74, 73, 71 for port, log, interface; the earlier logs are untouched, the new one is", os.path.basename(made))
 PYTHON

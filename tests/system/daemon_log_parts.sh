@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# A raw log in parts of 1 MiB: the daemon leaves each on the ground alone, a flight is in one of them, which `report` tells by itself, and
+# A raw log in parts of 2 MiB: the daemon leaves each on the ground alone, a flight is in one of them, which `report` tells by itself, and
 # all together are replayed bit for bit; not one without those before it.
 #   daemon_log_parts.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
@@ -14,7 +14,7 @@ wait_for() {
   die "part $1 was not begun"
 }
 start_bench "$build/services" "$log" builtin:apartment 3.0,4.2,1.2 builtin:quad-5in
-more_tables='max_mib = 1' start_daemon builtin:quad-5in "$work/flight.bwlog"
+more_tables='max_mib = 2' start_daemon builtin:quad-5in "$work/flight.bwlog"
 wait_for 2
 enable
 ctl takeoff --height 1.2 --wait

@@ -26,7 +26,7 @@ bash -c 'trap "kill \$(jobs -p) 2>/dev/null || true" EXIT; set -eux -o pipefail;
 }
 made=$(grep -oE '(--report|--out|-o|--mcap) [a-z0-9-]+(\.[a-z]+)+' "$work/guide" | awk '{print $2}' | sort -u)
 [[ $(wc -w <<<"$made") -ge 12 ]] || { echo "guide: hardly anything is made" >&2; exit 1; }
-for file in $made flight.bwlog; do
+for file in $made flight.mcap; do
   [[ -s $file ]] || { echo "guide: $file was not made" >&2; exit 1; }
 done
 echo "$(grep -c '^++ backwash' "$work/said") commands, $(wc -w <<<"$made") files"

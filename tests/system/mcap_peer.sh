@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# `backwash export` of a flight of the real processes, against independent readers of MCAP and of ROS 2's messages from the npm
-# registry (tests/log/peer). What is in the file is what the raw log, read by other code, and the CSV say; replay, report, adapt and study
-# take the file as they take the raw log. Then `backwash merge` with a ULog of what the emulated PX4 said.
+# The log of a flight of the real processes, as the daemon wrote it, against independent readers of MCAP and of ROS 2's messages from the
+# npm registry (tests/log/peer): what its topics say is what its records, read by other code, and the CSV say. Cut short as by a kill it is
+# read to its last whole record by them and by us. `backwash export` of it, and of the same records in the format of before, is the same
+# file to all; replay, report, adapt and study take each. Then `backwash merge` with a ULog of what the emulated PX4 said.
 #   mcap_peer.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source_dir=$1 build=$2
@@ -14,11 +15,26 @@ backwash=$build/services/backwash
 before=$(date +%s)
 "$source_dir/services/bench/flight.sh" "$build" "$out" flight builtin:apartment 3.0,4.2,1.2 7.4,3.0,1.2 builtin:quad-5in 1 px4 >/dev/null || { cat "$out/flight.log"; exit 1; }
 cd "$out"
+export PYTHONPATH=$source_dir/tests/system
+python3 - <<'PYTHON'
+import struct
+import raw_log
+with open("old.bwlog", "wb") as file:
+    file.write(raw_log.MAGIC)
+    for t, kind, body in raw_log.records("flight.bwlog"):
+        file.write(struct.pack("<qII", round(t * 1e9), kind, len(body)) + body)
+PYTHON
 "$backwash" export flight.bwlog --mcap flight.mcap --csv flight.csv --json --quiet >export.json
-node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" flight.mcap >peer.json
+"$backwash" export old.bwlog --mcap old.mcap --json --quiet | sed s/old.bwlog/flight.bwlog/ >old.json
+cmp flight.mcap old.mcap || { echo 'in the format of before it is another log'; exit 1; }
+node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" flight.bwlog >peer.json
+node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" flight.mcap >exported.json
+head -c $(($(stat -c %s flight.bwlog) / 2)) flight.bwlog >cut.bwlog
+node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" cut.bwlog cut >cut.json
+"$backwash" replay --log cut.bwlog --json | grep -q '"equal": *true'
 
-# A raw log and its MCAP are one flight to every verb.
-for log in flight.bwlog flight.mcap flight.csv; do
+# However a log is written, it is one flight to every verb.
+for log in flight.bwlog old.bwlog flight.mcap flight.csv; do
   for verb in "adapt $log" "study --quick --log $log"; do
     "$backwash" $verb --vehicle builtin:quad-5in --map builtin:apartment --json --quiet | sed "s/$log/LOG/" >$log.${verb%% *}
   done
@@ -27,20 +43,22 @@ for log in flight.bwlog flight.mcap flight.csv; do
   "$backwash" report --log $log --json --quiet | sed "s/$log/LOG/" >$log.report
 done
 for answer in replay report adapt study; do
-  [[ -s flight.bwlog.$answer ]] && cmp flight.bwlog.$answer flight.mcap.$answer || { echo "$answer: the MCAP is another flight"; exit 1; }
+  for log in old.bwlog flight.mcap; do
+    [[ -s flight.bwlog.$answer ]] && cmp flight.bwlog.$answer $log.$answer || { echo "$answer: $log is another flight"; exit 1; }
+  done
 done
 for answer in adapt study; do
   cmp flight.bwlog.$answer flight.csv.$answer || { echo "$answer: the CSV is another flight"; exit 1; }
 done
 grep -q '"equal": *true' flight.mcap.replay
 
-PYTHONPATH=$source_dir/tests/system python3 - "$before" "$source_dir/ros2/backwash_bringup/plotjuggler/recorded.xml" <<'PYTHON'
+python3 - "$before" "$source_dir/ros2/backwash_bringup/plotjuggler/recorded.xml" <<'PYTHON'
 import csv, hashlib, json, struct, sys, time
 from xml.etree import ElementTree
 import raw_log
 
 before = int(sys.argv[1])
-peer, told = json.load(open("peer.json")), json.load(open("export.json"))
+peer, told, cut = (json.load(open(f"{name}.json")) for name in ("peer", "export", "cut"))
 said, counts = peer["said"], peer["counts"]
 records = list(raw_log.records("flight.bwlog"))
 ticks = [(t, struct.unpack_from("<3Q6I5fI34d2I", body)) for t, kind, body in records if kind == raw_log.TICK]
@@ -48,9 +66,14 @@ odometry = [(t, struct.unpack("<q10d", body)) for t, kind, body in records if ki
 print({topic: counts.get(topic, 0) for topic in told["messages"]}, "chunks", peer["chunks"], "MCAP", told["messages"])
 assert counts == {topic: n for topic, n in told["messages"].items() if n > 0}
 
-# Byte for byte the raw log, but for its first line.
-assert peer["raw"] == hashlib.sha256(open("flight.bwlog", "rb").read()[len(raw_log.MAGIC):]).hexdigest()
-assert counts["/backwash/raw_log"] == len(records)
+# Exported, it is the same but for its chunks.
+assert {**peer, "chunks": 0} == {**json.load(open("exported.json")), "chunks": 0}
+# Byte for byte the records of before, and as far as it goes of one that is cut short.
+old = open("old.bwlog", "rb").read()[len(raw_log.MAGIC):]
+assert peer["raw"] == hashlib.sha256(old).hexdigest() and counts["/backwash/raw_log"] == len(records)
+begun = list(raw_log.records("cut.bwlog"))
+assert len(records) / 4 < len(begun) == cut["counts"]["/backwash/raw_log"] < len(records)
+assert cut["raw"] == hashlib.sha256(old[:sum(16 + len(body) for _, _, body in begun)]).hexdigest()
 # PlotJuggler's layout finds every topic that it plots (its members: ros2_bringup).
 curves = [curve.get("name") for curve in ElementTree.parse(sys.argv[2]).iter("curve")]
 assert len(curves) >= 10 and all(any(curve.startswith(topic + "/") for topic, n in counts.items() if n) for curve in curves), curves
@@ -109,18 +132,18 @@ assert cubes["type"] == 6 and len(cubes["points"]) > 1000 and len({tuple(p) for 
 PYTHON
 
 # With the autopilot's own log: its poses are where they were heard, but for the way, and where the VIO has the vehicle.
-PYTHONPATH=$source_dir/tests/system python3 -c 'import ulog_maker; ulog_maker.write("fc.ulg", "flight.bwlog")'
+python3 -c 'import ulog_maker; ulog_maker.write("fc.ulg", "flight.bwlog")'
 "$backwash" merge flight.mcap fc.ulg -o both.mcap --json --quiet >merge.json
 node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" both.mcap >both.json
 # Of another flight: at another time, or elsewhere at that time.
 for other in "later_ms=600000:none of its poses is of the time of flight.mcap" "north_m=3:its poses are 3.0 m (median) from those"; do
-  PYTHONPATH=$source_dir/tests/system python3 -c "import ulog_maker; ulog_maker.write('other.ulg', 'flight.bwlog', ${other%%:*})"
+  python3 -c "import ulog_maker; ulog_maker.write('other.ulg', 'flight.bwlog', ${other%%:*})"
   code=0
   "$backwash" merge flight.mcap other.ulg -o none.mcap --quiet 2>refused || code=$?
   [[ $code == 65 && ! -e none.mcap ]] && grep -qF "${other#*:}" refused || { echo "merged with another flight's: $code $(<refused)"; exit 1; }
 done
 "$backwash" replay --log both.mcap --json | cmp - flight.bwlog.replay
-PYTHONPATH=$source_dir/tests/system python3 - <<'PYTHON'
+python3 - <<'PYTHON'
 import bisect, json, math, statistics
 import raw_log, ulog_maker
 

@@ -4,7 +4,7 @@ import collections
 import csv
 import struct
 
-MAGIC = b"backwash raw log 3\n"
+MAGIC, MCAP, TOPIC = b"backwash raw log 3\n", b"\x89MCAP0\r\n", b"/backwash/raw_log"
 ODOMETRY, FRAME_IN, FRAME_OUT, TICK, LOST, SCAN, WORLD, FAILURE = 2, 6, 7, 8, 13, 14, 15, 16
 MODES = ["passive", "enabling", "tracking", "hold", "land", "quiet", "lifting"]
 SETPOINT, HEARTBEAT, COMMAND, ODOMETRY_FRAME, TIMESYNC = 84, 0, 76, 331, 111
@@ -13,13 +13,38 @@ Tick = collections.namedtuple("Tick", "t number segment index mode reason sent j
 
 
 def records(path):
+    """Of a log of the daemon, as it is now (MCAP) or was before: t (s), kind, content. What is cut short at its end is left out."""
     data = open(path, "rb").read()
-    assert data.startswith(MAGIC), path
-    at = len(MAGIC)
-    while at + 16 <= len(data):
+    for at in raw_records(data) if data.startswith(MCAP) else old_records(data):
         t, kind, size = struct.unpack_from("<qII", data, at)
         yield t * 1e-9, kind, data[at + 16:at + 16 + size]
-        at += 16 + size
+
+
+def old_records(data):
+    assert data.startswith(MAGIC), data[:32]
+    at = len(MAGIC)
+    while at + 16 <= len(data):
+        yield at
+        at += 16 + struct.unpack_from("<I", data, at + 12)[0]
+
+
+def raw_records(data):
+    """Where those of the raw log begin in an MCAP file without compression."""
+    at, raw = len(MCAP), None
+    while at + 9 <= len(data):
+        op, length = struct.unpack_from("<BQ", data, at)
+        at += 9
+        if op == 6:  # a chunk: its messages follow its head, its compression's name is empty
+            at += 40
+            continue
+        if op == 4:
+            size = struct.unpack_from("<I", data, at + 4)[0]
+            raw = struct.unpack_from("<H", data, at)[0] if data[at + 8:at + 8 + size] == TOPIC else raw
+        if op == 15 or at + length > len(data):
+            return
+        if op == 5 and struct.unpack_from("<H", data, at)[0] == raw:
+            yield at + 22 + 16  # behind the message's head and that of its octets
+        at += length
 
 
 def ticks(path):
