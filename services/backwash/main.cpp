@@ -30,7 +30,10 @@ Verb compare_verb(Command& app) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc > 1 && std::string_view(argv[1]) == "compare") ::execv(compare_program().c_str(), argv);
+  if (argc > 1 && std::string_view(argv[1]) == "compare") {
+    ::execv(compare_program().c_str(), argv);
+    if (argc < 3 || std::string_view(argv[2]) != "--help") argc = 2;  // its options are that program's
+  }
   return run_tool(argc, argv,
                   {fly_verb, plan_verb, reach_verb, field_verb, simulate_verb, feasibility_verb, compare_verb,
                    report_verb, calibrate_verb, import_verb, replay_verb, export_verb, merge_verb, study_verb,

@@ -9,18 +9,22 @@ out=${2:?usage: compare.sh BACKWASH OUTPUT_FOLDER [SEED]}
 seed=${3:-1}
 flights=200
 mkdir -p "$out"
-scenes=(builtin "$(realpath "$(dirname "${BASH_SOURCE[0]}")/../data/maps/geb079.bt")")
+building=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../data/maps/geb079.bt")
 
 # A campaign: what was cut goes on with the next call of the same arguments. Another seed is another folder.
 campaign=$out/campaign-$seed
-if [[ ! -f $campaign/manifest.json ]]; then
-  printf 'kind = "compare"\n[compare]\nscenes = [%s]\nflights = %s\nseed = %s\n' \
-    "$(printf '"%s", ' "${scenes[@]}")" $flights "$seed" >"$out/campaign.toml"
-  "$backwash" campaign plan "$out/campaign.toml" -o "$campaign"
-fi
-"$backwash" campaign run "$campaign" --jobs "$(nproc)"
-"$backwash" campaign merge "$campaign"
-cp "$campaign/result" "$out/compare.json"
+for scene in builtin:{apartment,corridors,narrow-gap,forest-1,forest-2} "$building"; do
+  for vehicle in builtin:quad-5in builtin:quad-7in; do
+    for first in 0 50 100 150; do
+      printf '%q ' backwash compare --quiet --threads 1 --scenes "$scene" --vehicle "$vehicle" --flights $flights --seed "$seed" --rows \
+        --pairs $first:$((first + 50))
+      echo
+    done
+  done
+done >"$campaign.txt"
+seq "$(wc -l <"$campaign.txt")" | xargs -P "$(nproc)" -n 1 "$backwash" campaign run "$campaign.txt" -o "$campaign"
+"$backwash" campaign merge "$campaign.txt" -o "$campaign"
+"$backwash" compare --from "$campaign/rows.jsonl" --flights $flights --seed "$seed" --json >"$out/compare.json"
 "$backwash" compare --from "$campaign/rows.jsonl" --flights $flights --seed "$seed" --force \
   --report "$out/compare.html" --out "$out/compare.csv" >"$out/compare.txt"
 

@@ -10,13 +10,10 @@ worlds=${2:-200}
 seed=${3:-${BACKWASH_STUDY_SEED:-$(date +%s)}}
 file=${4:-study-$seed}
 "$matrix" --null-size --worlds "$worlds" --seed "$seed" --jobs "$(nproc)" >"$file-null.md"
-if [[ ! -f $file-campaign/manifest.json ]]; then
-  {
-    printf 'kind = "program"\nseconds = 50\n[program]\nname = "world"\nseed = %s\ncount = %s\n' "$seed" "$worlds"
-    printf 'command = ["%s", "--rows", "--worlds", "1", "--seed", "{seed}"]\n' "$matrix"
-  } >"$file.toml"
-  "$backwash" campaign plan "$file.toml" -o "$file-campaign"
-fi
-"$backwash" campaign run "$file-campaign" --jobs "$(nproc)"
-"$backwash" campaign merge "$file-campaign"
+for ((k = 0; k < worlds; ++k)); do
+  printf '%q ' "$matrix" --rows --worlds 1 --seed $((seed + k))
+  echo
+done >"$file.txt"
+seq "$worlds" | xargs -P "$(nproc)" -n 1 "$backwash" campaign run "$file.txt" -o "$file-campaign"
+"$backwash" campaign merge "$file.txt" -o "$file-campaign"
 exec "$matrix" --from "$file-campaign/rows.jsonl" --markdown "$file.md" --gate

@@ -11,6 +11,18 @@ small=(compare --quiet --scenes builtin:narrow-gap --flights 8)
 "$backwash" "${small[@]}" --seed 2 --vehicle builtin:quad-5in --model builtin:quad-5in --out c.csv >/dev/null
 grep -q '^tight ' table.txt || die "no row of the table for tight"
 
+# Parts by other processes add up to the whole.
+one=("${small[@]}" --seed 1 --vehicle builtin:quad-5in)
+"$backwash" "${one[@]}" --rows --pairs 0:3 >rows.jsonl
+"$backwash" "${one[@]}" --rows --pairs 3:8 >>rows.jsonl
+"$backwash" compare --from rows.jsonl --flights 8 --seed 1 --json >merged.json
+"$backwash" "${one[@]}" --untimed --json | cmp - merged.json || die "parts are not the whole"
+# Installed, the tool has no such program beside it, and says where it is.
+mkdir alone
+cp "$backwash" alone/backwash
+! alone/backwash compare --flights 1 2>alone.txt || die "compare without its program"
+grep -q '^backwash compare: .*build the source tree' alone.txt || die "$(cat alone.txt)"
+
 python3 - <<'PYTHON'
 import csv, json, re
 rows = {name: list(csv.DictReader(open(name + ".csv"))) for name in "abc"}
