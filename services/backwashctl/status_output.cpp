@@ -91,4 +91,25 @@ void print(const StatusCopy& s) {
   std::fflush(stdout);
 }
 
+nlohmann::ordered_json json_of(const std::optional<dds::AirSaid>& air) {
+  nlohmann::ordered_json classes = nlohmann::ordered_json::array();
+  if (air)
+    for (const auto& [name, factor, ln_evidence, seconds, cause] : air->classes)
+      classes.push_back({{"class", name},
+                         {"factor", factor},
+                         {"ln_evidence", ln_evidence},
+                         {"seconds", seconds},
+                         {"cause", cause.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(cause)}});
+  return {{"learns", air.has_value()}, {"frozen", air && air->frozen}, {"classes", classes}};
+}
+
+void print(const std::optional<dds::AirSaid>& air) {
+  if (!air) return void(std::printf("nothing is learnt of the air: adaptation.enabled is false\n"));
+  if (air->frozen) std::printf("frozen: the factors stay as they are until thawed\n");
+  if (air->classes.empty()) std::printf("as modelled; nothing was flown yet\n");
+  for (const auto& [name, factor, ln_evidence, seconds, cause] : air->classes)
+    std::printf("%-9s factor %.2f%s%s%s, ln evidence %.1f, %.0f s of flight\n", name.c_str(), factor,
+                factor < 1 ? " (calmer)" : "", cause.empty() ? "" : ", by ", cause.c_str(), ln_evidence, seconds);
+}
+
 }  // namespace backwash::ctl

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "services/backwashctl/station.hpp"
+#include "services/dds/air_text.hpp"
 
 namespace backwash::ctl {
 
@@ -13,5 +14,9 @@ nlohmann::json json_of(const StatusCopy& status);
 std::string text_of(const nlohmann::json& json, int indent);
 /// One line of it on stdout.
 void print(const StatusCopy& status);
+
+/// What the flight has learnt of its air, of each class; null: nothing is learnt.
+nlohmann::ordered_json json_of(const std::optional<dds::AirSaid>& air);
+void print(const std::optional<dds::AirSaid>& air);
 
 }  // namespace backwash::ctl
