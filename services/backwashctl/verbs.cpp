@@ -30,20 +30,20 @@ std::string default_station() {
 constexpr std::string_view kNotToldYet = "no value of ";  // how such a refusal begins
 
 bool tracking(const StatusCopy& s) { return s.in(Mode::tracking); }
-bool rests(const StatusCopy& s) { return tracking(s) && !s.numbers.moving; }
+bool rests(const StatusCopy& s) { return tracking(s) && !s.said.moving; }
 /// A task that is not done counts: a route may pass its last place on the way, and a turn begins where it ends.
 std::function<bool(const StatusCopy&)> rests_at(const Vec3& goal) {
   return [goal](const StatusCopy& s) {
-    const auto& p = s.numbers.setpoint;
-    return rests(s) && s.task.empty() && (Vec3(p.x, p.y, p.z) - goal).norm() < 0.01;
+    const auto& p = s.said.setpoint;
+    return rests(s) && s.text(&dds::Status::task).empty() && (Vec3(p.x, p.y, p.z) - goal).norm() < 0.01;
   };
 }
 
 /// The measured height counts: a set-point is there before the vehicle is.
 bool risen(const StatusCopy& s) {
   constexpr double kNear = 0.1;  // m
-  return rests(s) && !s.numbers.landed && s.task.empty() &&
-         std::abs(s.numbers.position.z - s.numbers.setpoint.z) < kNear;
+  return rests(s) && !s.said.landed && s.text(&dds::Status::task).empty() &&
+         std::abs(s.said.position.z - s.said.setpoint.z) < kNear;
 }
 
 }  // namespace
@@ -150,14 +150,14 @@ void Verbs::add_ends(Command& app) {
                "stop --wait",
                [this] {
                  return command("stop", backwash_msgs_msg_dds__COMMAND_STOP, Vec3::Zero(), [](const StatusCopy& s) {
-                   return s.in(Mode::passive) || (s.in(Mode::hold) && !s.numbers.moving);
+                   return s.in(Mode::passive) || (s.in(Mode::hold) && !s.said.moving);
                  });
                }),
           20);
   waiting(verb(app, "land", "land below, with the autopilot's own landing", "land --wait",
                [this] {
                  return command("land", backwash_msgs_msg_dds__COMMAND_LAND, Vec3::Zero(),
-                                [](const StatusCopy& s) { return s.in(Mode::passive) && !s.numbers.armed; });
+                                [](const StatusCopy& s) { return s.in(Mode::passive) && !s.said.armed; });
                }),
           60);
 }
@@ -211,10 +211,13 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
   std::string last = "no status";
   bool superseded = false, set_out = false;
   const bool reached = station.wait(patience_s_, done, [&](const StatusCopy& s) {
-    last = s.state + " (" + s.reason + ")" + (s.task.empty() ? "" : ", " + s.task) +
-           (s.autopilot_says.empty() ? "" : "; the autopilot says: " + s.autopilot_says);
+    last = s.text(&dds::Status::state) + " (" + s.text(&dds::Status::reason) + ")" +
+           (s.text(&dds::Status::task).empty() ? "" : ", " + s.text(&dds::Status::task)) +
+           (s.text(&dds::Status::autopilot_says).empty()
+                ? ""
+                : "; the autopilot says: " + s.text(&dds::Status::autopilot_says));
     superseded = station.superseded(s);
-    if (superseded || s.task.starts_with(kRefusedTask)) return true;
+    if (superseded || s.text(&dds::Status::task).starts_with(kRefusedTask)) return true;
     // On its way to a goal it goes on by itself after an obstacle. A hold that was there before is not its end.
     const bool on_its_way =
         verb == backwash_msgs_msg_dds__COMMAND_GOTO || verb == backwash_msgs_msg_dds__COMMAND_GOTO_FACING ||
@@ -328,10 +331,10 @@ int Verbs::adaptation() {
   Station station(options_);
   const auto now = station.status(options_.timeout_s);
   if (!now) return services::say_error("backwashctl adaptation", nobody()), kUnavailable;
-  const auto air = dds::air_said(now->air);
-  if (!air && !now->air.empty())
+  const auto air = dds::air_said(now->text(&dds::Status::air));
+  if (!air && !now->text(&dds::Status::air).empty())
     return services::say_error("backwashctl adaptation",
-                               "the daemon is of another version: it says '" + now->air + "'"),
+                               "the daemon is of another version: it says '" + now->text(&dds::Status::air) + "'"),
            kUnavailable;
   if (json_)
     std::cout << json_of(air).dump(2) << "\n";

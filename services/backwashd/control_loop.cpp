@@ -199,7 +199,7 @@ void ControlLoop::send(const track::TickInput& in, const track::TickOutput& out)
   if (s.changed && s.mode == Mode::quiet) link_.discard_unsent();
   if (s.send_setpoint && link_.send_setpoint(out.command_local, time_of(in.now_ns))) {
     row_.sent |= 1;
-    ++view_.setpoints;
+    ++view_.shown.setpoints_sent;
     if (out.fresh) {
       const double us = static_cast<double>(daemon::now_ns() - in.odometry->received_ns) * 1e-3;
       view_.odometry_to_wire.add(us);
@@ -242,8 +242,9 @@ void ControlLoop::report(const track::TickInput& in, const track::TickOutput& ou
   if (out.supervisor.changed) tell(ControlEvent::Kind::transition, 0);
   if (in.missed_periods > 0) tell(ControlEvent::Kind::missed_deadline, static_cast<std::uint64_t>(in.missed_periods));
   const std::uint64_t faults = page_faults();
-  if (view_.ticks > 1 && faults > view_.page_faults) tell(ControlEvent::Kind::page_fault, faults - view_.page_faults);
-  view_.page_faults = faults;
+  if (view_.ticks > 1 && faults > view_.shown.page_faults)
+    tell(ControlEvent::Kind::page_fault, faults - view_.shown.page_faults);
+  view_.shown.page_faults = faults;
 
   row_.tick = view_.ticks;
   row_.missed_periods = static_cast<std::uint32_t>(in.missed_periods);
@@ -356,7 +357,7 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.armed = in.autopilot.armed;
   view_.offboard = in.autopilot.offboard;
   view_.landed = out.landed;
-  view_.aligned = flight_.alignment().aligned();
+  view_.shown.frames_aligned = flight_.alignment().aligned();
   view_.mismatch = flight_.alignment().mismatch();
   view_.odometry_age = flight_.odometry_age();
   view_.odometry_lost_after = flight_.odometry_lost_after();
@@ -381,12 +382,12 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
   view_.closures = tracker.closures();
   view_.shift = tracker.shift();
   if (out.refused) view_.refused_segment = in.segment->id;
-  view_.odometry_received += in.odometry.has_value();
-  view_.odometry_rejected += in.odometry && !out.fresh;
-  if (out.inside.judged) ++(out.inside.inside ? view_.inside : view_.outside);
-  view_.missed += static_cast<std::uint64_t>(in.missed_periods);
-  view_.frames_bad = link_.received().bad_crc;
-  if (link_.signing()) view_.frames_refused = link_.signing()->counters().refused();
+  view_.shown.odometry_received += in.odometry.has_value();
+  view_.shown.odometry_rejected += in.odometry && !out.fresh;
+  if (out.inside.judged) ++(out.inside.inside ? view_.shown.samples_inside : view_.shown.samples_outside);
+  view_.shown.ticks_missed += static_cast<std::uint64_t>(in.missed_periods);
+  view_.shown.frames_bad = link_.received().bad_crc;
+  if (link_.signing()) view_.shown.frames_refused = link_.signing()->counters().refused();
   constexpr std::uint8_t kWorstNotice = 4;  // severity: 4 is a warning
   if (telemetry.text && telemetry.text->value.severity <= kWorstNotice) view_.warning = telemetry.text;
   const auto battery = telemetry.battery.at(now);
@@ -394,7 +395,7 @@ void ControlLoop::publish(const track::TickInput& in, const track::TickOutput& o
     channels_.events.push_or_count({ControlEvent::Kind::battery_silent, in.now_ns, view_.mode, view_.reason, 0});
   view_.battery = battery;
   view_.residual_m = flight_.alignment().position_residual();
-  view_.residual_rad = flight_.alignment().yaw_residual();
+  view_.shown.frame_residual_rad = flight_.alignment().yaw_residual();
 }
 
 }  // namespace backwash::daemon

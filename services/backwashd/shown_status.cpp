@@ -38,7 +38,8 @@ std::string to_string(const AirView& air) {
 
 }  // namespace
 
-ShownStatus::ShownStatus(const ControlView& view, const Vehicle& vehicle, const Channels& channels) {
+ShownStatus::ShownStatus(const ControlView& view, const Vehicle& vehicle, const Channels& channels)
+    : message_(view.shown) {
   message_.stamp = dds::wall_clock();
   message_.vehicle = dds::c_string(vehicle.name);
   take_view(view);
@@ -55,21 +56,10 @@ void ShownStatus::take_view(const ControlView& view) {
   s.offboard = view.offboard;
   s.landed = view.landed.value_or(false);
   s.moving = !view.finished;
-  s.frames_aligned = view.aligned;
   s.position = point(view.state.p_W);
   s.setpoint = point(view.command.p_W);
   s.ticks = view.ticks;
-  s.ticks_missed = view.missed;
-  s.setpoints_sent = view.setpoints;
-  s.samples_inside = view.inside;
-  s.samples_outside = view.outside;
-  s.odometry_received = view.odometry_received;
-  s.odometry_rejected = view.odometry_rejected;
-  s.frames_bad = view.frames_bad;
-  s.frames_refused = view.frames_refused;
-  s.page_faults = view.page_faults;
   s.frame_residual_m = view.residual_m;
-  s.frame_residual_rad = view.residual_rad;
   s.odometry_age = view.odometry_age;
   s.odometry_lost_after = view.odometry_lost_after;
   s.heartbeat_age = view.heartbeat_age;

@@ -33,7 +33,7 @@ class ShownStatus {
   std::vector<firmware_bridge::ParameterFinding> findings_;
   std::vector<dds::Parameter> parameters_;
   std::vector<dds::Advice> advice_;
-  dds::Status message_{};
+  dds::Status message_;
 };
 
 }  // namespace backwash::daemon

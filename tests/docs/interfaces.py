@@ -84,11 +84,12 @@ def names_of_json(text: str) -> set[str]:
 
 
 def names_of_status(root: pathlib.Path) -> set[str]:
-    """Keys of the status: in json_of itself, and in the lists of members that it goes through."""
-    folder = root / "services/backwashctl"
-    code = (folder / "status_output.cpp").read_text()
-    lists = code + (folder / "station.hpp").read_text()
-    return names_of_json(code.split("json_of(")[1]) | set(re.findall(r'\{"(\w+)",\s*&dds::Status::', lists))
+    """Keys of the status: the list that every output goes through, and the parameters. It has each member of the IDL."""
+    idl = re.search(r"struct Status_ \{(.*?)\};", re.sub(r"//[^\n]*", "", (root / "idl/backwash_msgs.idl").read_text()), re.S)[1]
+    listed = re.findall(r'StatusMember\{"(\w+)",\s*&Status::(\w+)', (root / "services/dds/status_members.hpp").read_text())
+    expect("members of the status", {member for _, member in listed} | {"stamp", "session", "sequence_number", "parameters", "advice"},
+           set(re.findall(r"(\w+);", idl)))
+    return {key for key, _ in listed} | {"parameters"}
 
 
 def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> None:
@@ -172,13 +173,11 @@ DELIVERY = {"latest": "best effort, keep last 1", "scans": "best effort, keep la
 
 
 def check_dds(root: pathlib.Path, sections_of: dict[str, str]) -> None:
-    code = (root / "services/dds/topics.hpp").read_text()
-    actual = set()
-    for type_, name, delivery in re.findall(
-            r"return (\w+)_desc; \}\s*static constexpr const char\* kName = \"(\w+)\";\s*"
-            r"static constexpr Delivery kDelivery = Delivery::(\w+);", code):
-        actual.add((name, type_.replace("_msg_dds__", "::msg::dds_::"), DELIVERY[delivery]))
-    documented = {(re.search(r"/(\w+)(?: |$)", c[0])[1], c[1], c[3]) for c in rows(sections_of["DDS"])[1:]}
+    types = re.findall(r'Typed<(\w+)_desc, topic_named\("(\w+)"\)>', (root / "services/dds/topics.hpp").read_text())
+    type_of = {name: type_.replace("_msg_dds__", "::msg::dds_::") for type_, name in types}
+    actual = {(name, type_of.get(name), DELIVERY[delivery], "out" if "kVehicle" in writers else "in") for name, delivery, writers in
+              re.findall(r'\{"(\w+)", Delivery::(\w+), (.+)\},', (root / "idl/topics.hpp").read_text())}
+    documented = {(re.search(r"/(\w+)(?: |$)", c[0])[1], c[1], c[3], c[2]) for c in rows(sections_of["DDS"])[1:]}
     expect("DDS topics", documented, actual)
     idl = (root / "idl/backwash_msgs.idl").read_text()
     for prefix in ("COMMAND_", "ACK_"):
@@ -197,12 +196,6 @@ def check_mavlink(root: pathlib.Path, sections_of: dict[str, str]) -> None:
     cells = " ".join(c[0] for c in rows(section))
     words = set(re.findall(r"\b[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*\b", cells + section.split("The codec knows more")[1].split("\n\n")[0]))
     expect("MAVLink messages", words, actual)
-    message = r"\b[A-Z][A-Z]+(?:_[A-Z]+)*\b"
-    bridge = rows(sections((root / "firmware_bridge/README.md").read_text())["Messages"])
-    for way, cell in (("out", 0), ("in", 2)):
-        table = section.split(f"| {way} |")[1].split("\n\n")[0]
-        told = {m for c in rows(table) for m in re.findall(message, c[0])}
-        expect(f"MAVLink messages {way} of firmware_bridge/README.md", {m for c in bridge for m in re.findall(message, c[cell])}, told)
 
 
 def main() -> int:
