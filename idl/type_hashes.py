@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Type hashes of the messages of idl/ as ROS 2 has them since Iron (REP 2016, "RIHS01"), as services/dds/type_hashes.hpp.
+"""Type hashes of the messages of idl/ as ROS 2 has them since Iron (REP 2016, "RIHS01"), for services/dds.
 
-type_hashes.py [SOURCE_DIR]          prints that file
-type_hashes.py SOURCE_DIR --check    1 if it holds anything else, or a hash is not the one that ROS 2 publishes
+type_hashes.py [SOURCE_DIR]          prints the header that the build includes
+type_hashes.py SOURCE_DIR --check    1 if a hash is not the one that ROS 2 publishes
 
 A hash is SHA-256 of the type's description: names and types of its members in order, and those of all types below it.
 """
@@ -40,18 +40,22 @@ HEAD = """// SPDX-License-Identifier: BSD-3-Clause
 #include <iterator>
 #include <string_view>
 
-/// Written by idl/type_hashes.py; the test type_hashes says when it has to be again.
+#include "backwash_msgs.h"
+
+/// Written by idl/type_hashes.py.
 namespace backwash::dds {
+
+/// Of all of idl/, for who takes any type by its name.
+inline const dds_topic_descriptor_t* const kDescriptors[] = {
+%s};
 
 struct TypeHash {
   std::string_view type, hash;
 };
 
-// clang-format off
 inline constexpr TypeHash kTypeHashes[] = {
 """
 TAIL = """};
-// clang-format on
 
 /// What ROS 2's tools compare types by, of a type by its name on the wire; empty: of one that is not of idl/.
 constexpr std::string_view type_hash(std::string_view type) {
@@ -101,13 +105,12 @@ def main() -> int:
     types = types_of((root / "idl/ros2.idl").read_text()) | types_of((root / "idl/backwash_msgs.idl").read_text())
     hashes = {name: hash_of(name, types) for name in types}
     lines = (f'    {{"{n.replace("/msg/", "::msg::dds_::")}_", "RIHS01_{h}"}},\n' for n, h in hashes.items())
-    text = HEAD + "".join(lines) + TAIL
+    described = "".join(f"    &{name.replace('/msg/', '_msg_dds__')}__desc,\n" for name in types)
+    text = HEAD % described + "".join(lines) + TAIL
     if len(sys.argv) < 3:
         print(text, end="")
         return 0
     wrong = [f"{n}: {hashes.get(n)}, ROS 2 has {h}" for n, h in PUBLISHED.items() if hashes.get(n) != h]
-    if (root / "services/dds/type_hashes.hpp").read_text() != text:
-        wrong.append("services/dds/type_hashes.hpp is not what idl/type_hashes.py writes")
     print("\n".join(wrong) or f"{len(hashes)} types, {len(PUBLISHED)} hashes as ROS 2 publishes them")
     return 1 if wrong else 0
 

@@ -113,7 +113,7 @@ void BlockSweep::take_over_sums() {
   }
 }
 
-void BlockSweep::run(const WholeField::Block& block) {
+void BlockSweep::sweep(const WholeField::Block& block) {
   open(block);
   for (int dx = -whole_.radius_; dx <= whole_.radius_; ++dx) {
     open_plane(dx);
@@ -152,20 +152,18 @@ void BlockSweep::each(Lateral& lateral, const Store& store) {
   }
 }
 
-void WholeField::evaluate(std::size_t begin, std::size_t end,
-                          const std::function<void(std::size_t, const Variance&)>& store) const {
-  if (begin == end) return;
-  BlockSweep sweep(*this);
+void BlockSweep::run(std::span<const WholeField::Block> blocks,
+                     const std::function<void(std::size_t, const Variance&)>& store) {
   const auto sweep_all = [&](auto lateral) {
-    for (std::size_t n = begin; n < end; ++n) {
-      sweep.run(blocks_[n]);
-      sweep.each(lateral, store);
+    for (const WholeField::Block& block : blocks) {
+      sweep(block);
+      each(lateral, store);
     }
   };
-  if (grid_->size().z() <= LateralColumns::kLayers)
-    sweep_all(LateralSweep<std::uint64_t>(lateral_));
+  if (whole_.grid_->size().z() <= LateralColumns::kLayers)
+    sweep_all(LateralSweep<std::uint64_t>(whole_.lateral_));
   else
-    sweep_all(LateralSweep<Layers>(lateral_));
+    sweep_all(LateralSweep<Layers>(whole_.lateral_));
 }
 
 }  // namespace backwash::field

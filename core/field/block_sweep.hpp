@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <vector>
 
 #include "core/field/lateral_sweep.hpp"
@@ -14,14 +16,15 @@ class BlockSweep {
  public:
   explicit BlockSweep(const WholeField& whole);
 
-  void run(const WholeField::Block& block);
-  /// Calls store(linear index, Σ) for the block's listed voxels.
-  template <typename Lateral, typename Store>
-  void each(Lateral& lateral, const Store& store);
+  /// Calls store(linear index, Σ) for the listed voxels of each block.
+  void run(std::span<const WholeField::Block> blocks, const std::function<void(std::size_t, const Variance&)>& store);
 
  private:
   static constexpr std::size_t kRows = WholeField::kRows;
 
+  void sweep(const WholeField::Block& block);
+  template <typename Lateral, typename Store>
+  void each(Lateral& lateral, const Store& store);
   void open(const WholeField::Block& block);
   void open_plane(int dx);
   void sweep_plane(int dx);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/field/block_sweep.hpp"
 #include "core/field/sight_path.hpp"
 
 namespace backwash::field {
@@ -108,6 +109,11 @@ std::span<const std::int32_t> WholeField::path(std::uint32_t offset, std::vector
   for (const Index3& cell : cells_on_path(stencil_.offsets[offset], 0.5 * Vec3::UnitZ()))
     scratch.push_back((cell.x() * grid_->size().z() + cell.z()) * height + cell.y());
   return scratch;
+}
+
+void WholeField::evaluate(std::size_t begin, std::size_t end,
+                          const std::function<void(std::size_t, const Variance&)>& store) const {
+  if (begin != end) BlockSweep(*this).run(std::span(blocks_).subspan(begin, end - begin), store);
 }
 
 }  // namespace backwash::field

@@ -2,15 +2,15 @@
 #pragma once
 
 #include <chrono>
-#include <memory>
-#include <optional>
+#include <gpiod.hpp>
 #include <string>
 #include <tl/expected.hpp>
+#include <utility>
 
 namespace backwash::firmware_bridge {
 
-/// One line of a GPIO chip, held for us alone, by libgpiod 1 (line_v1.cpp) or 2 (line_v2.cpp), whichever is installed.
-/// Nothing here is real-time: a line behind an I²C expander waits for its bus.
+/// One line of a GPIO chip, held for us alone, by libgpiod 1. Nothing here is real-time: a line behind an
+/// I²C expander waits for its bus.
 class GpioLine {
  public:
   enum class Use {
@@ -21,6 +21,8 @@ class GpioLine {
     bool high;
     std::chrono::steady_clock::time_point at;
   };
+  GpioLine(GpioLine&&) = default;
+  GpioLine& operator=(GpioLine&&) = default;
   using Error = std::string;  ///< one line: chip, line and the system's reason
 
   /// `chip`: a device as /dev/gpiochip0, or the label of the first that has it; `name`: of the line, as the board's
@@ -37,13 +39,9 @@ class GpioLine {
   tl::expected<void, Error> set(bool high);
 
  private:
-  // The two libraries have no type in common.
-  struct Handle;
-  struct Release {
-    void operator()(Handle* handle) const noexcept;
-  };
-  explicit GpioLine(std::unique_ptr<Handle, Release> handle) noexcept : handle_(std::move(handle)) {}
-  std::unique_ptr<Handle, Release> handle_;
+  GpioLine(gpiod::line line, std::string what) : line_(std::move(line)), what_(std::move(what)) {}
+  gpiod::line line_;  // keeps its chip open, and is given back with it
+  std::string what_;  // chip and line
 };
 
 }  // namespace backwash::firmware_bridge

@@ -40,9 +40,10 @@ Outcome go(Station& station, const Goal& goal) {
     station.status(1.0);  // the first may still be from before the acknowledgement
     station.status(1.0);
     station.wait(
-        kPlan_s, [](const StatusCopy& s) { return s.numbers.moving; },
+        kPlan_s, [](const StatusCopy& s) { return s.said.moving; },
         [&](const StatusCopy& s) {
-          if (!station.superseded(s) && s.task.starts_with(kRefusedTask)) outcome.why = s.task;
+          if (!station.superseded(s) && s.text(&dds::Status::task).starts_with(kRefusedTask))
+            outcome.why = s.text(&dds::Status::task);
           return station.superseded(s) || !outcome.why.empty();
         });
   }

@@ -13,7 +13,6 @@
 #include "core/config/map_window.hpp"
 #include "core/map/load_map.hpp"
 #include "core/map/octomap_message.hpp"
-#include "services/backwashctl/verbs.hpp"
 #include "services/command_line/exit_code.hpp"
 
 namespace backwash::ctl {
@@ -210,27 +209,6 @@ Outcome send_map(const Options& options, const MapOptions& map, bool quiet) {
                                                                   seconds(now_ns() - sending.progress_ns()));
   }
   return outcome;
-}
-
-void Verbs::add_map(Command& app) {
-  auto* sub = verb(app, "map", "send a map and wait until the daemon has it in use; on a bad line too",
-                   "map floor.bt --patience 60", [this] { return map(); });
-  sub->add_option("file", map_.file, "OctoMap, or builtin:NAME").required();
-  sub->add_option("--frame", map_.frame, "that the map is in: the daemon's frames.map").capture_default_str();
-  sub->add_option("--rate", map_.rate_kbit_s, "kbit/s that the line carries; slower lines are noticed")
-      .capture_default_str()
-      .check(services::within(64, 1e6));
-  sub->add_option("--patience", map_.patience_s, "s without a newly acknowledged part until it is given up")
-      .capture_default_str()
-      .check(services::positive());
-}
-
-int Verbs::map() {
-  try {
-    return say(send_map(options_, map_, json_), json_);
-  } catch (const dds::NotPermitted& e) {
-    return say({"map", false, std::nullopt, std::string("refused: ") + e.what()}, json_);
-  }
 }
 
 }  // namespace backwash::ctl

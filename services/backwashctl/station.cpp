@@ -43,17 +43,19 @@ int interrupted() noexcept { return signal_that_came; }
 
 StatusCopy copy_of(const dds::Status& status) {
   StatusCopy copy;
-  copy.numbers = status;
-  for (const StatusText& t : kStatusTexts) {
-    copy.*t.own = text(status.*t.sent);
-    copy.numbers.*t.sent = nullptr;
-  }
+  copy.said = status;
+  auto texts = std::make_shared<std::deque<std::string>>();
+  dds::each_status_member([&](const auto& member) {
+    auto& said = copy.said.*member.at;
+    if constexpr (std::is_same_v<decltype(said), char*&>) said = texts->emplace_back(text(said)).data();
+  });
+  copy.texts = std::move(texts);
   for (std::uint32_t n = 0; n < status.parameters._length; ++n)
     copy.parameters.emplace_back(text(status.parameters._buffer[n].name), status.parameters._buffer[n].value);
   for (std::uint32_t n = 0; n < status.advice._length; ++n)
     copy.advice.emplace_back(text(status.advice._buffer[n].name), text(status.advice._buffer[n].text));
-  copy.numbers.parameters = {};
-  copy.numbers.advice = {};
+  copy.said.parameters = {};
+  copy.said.advice = {};
   return copy;
 }
 

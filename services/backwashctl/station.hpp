@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <deque>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -9,7 +11,7 @@
 
 #include "core/types/geometry.hpp"
 #include "core/types/mode.hpp"
-#include "services/dds/topics.hpp"
+#include "services/dds/status_members.hpp"
 
 namespace backwash::ctl {
 
@@ -30,17 +32,17 @@ struct Options {
 /// The folder itself, where its credentials are good or it is none. Throws StartError 78.
 const std::string& judged(const std::string& folder);
 
-/// A copy of the daemon's status that owns its strings.
+/// The daemon's status, kept after its message.
 struct StatusCopy {
-  dds::Status numbers{};  ///< its members that own memory are null
-  std::string vehicle, state, reason, task, mismatch, place, stop_switch, refused, autopilot, autopilot_says, air,
-      autopilot_version;
+  dds::Status said{};                                       ///< its texts are in `texts`, its lists are null
+  std::shared_ptr<const std::deque<std::string>> texts;     ///< shared by copies
   std::vector<std::pair<std::string, double>> parameters;   ///< that the autopilot has told
   std::vector<std::pair<std::string, std::string>> advice;  ///< on those that are not good
 
+  std::string text(char* dds::Status::*member) const { return said.*member; }
   /// Whether state and reason are these. What a daemon of another version may say besides is none of them.
-  bool in(Mode mode) const noexcept { return mode_named(state) == mode; }
-  bool because(Reason why) const noexcept { return reason_named(reason) == why; }
+  bool in(Mode mode) const noexcept { return mode_named(said.state) == mode; }
+  bool because(Reason why) const noexcept { return reason_named(said.reason) == why; }
   /// Whether there is advice of this name: of a parameter, or dds::kAsking, dds::kArming.
   bool advises(std::string_view name) const noexcept {
     return std::ranges::any_of(advice, [&](const auto& each) { return each.first == name; });
@@ -50,31 +52,10 @@ struct StatusCopy {
 /// All that a message says.
 StatusCopy copy_of(const dds::Status& status);
 
-/// A text of the status: the key that JSON gives it, and where it is in the message and in a copy.
-struct StatusText {
-  const char* key;
-  char* dds::Status::*sent;
-  std::string StatusCopy::*own;
-};
-/// All of them.
-inline constexpr StatusText kStatusTexts[] = {
-    {"vehicle", &dds::Status::vehicle, &StatusCopy::vehicle},
-    {"state", &dds::Status::state, &StatusCopy::state},
-    {"reason", &dds::Status::reason, &StatusCopy::reason},
-    {"task", &dds::Status::task, &StatusCopy::task},
-    {"frame_mismatch", &dds::Status::mismatch, &StatusCopy::mismatch},
-    {"place", &dds::Status::place, &StatusCopy::place},
-    {"stop_switch", &dds::Status::stop_switch, &StatusCopy::stop_switch},
-    {"refused", &dds::Status::refused, &StatusCopy::refused},
-    {"autopilot", &dds::Status::autopilot, &StatusCopy::autopilot},
-    {"autopilot_says", &dds::Status::autopilot_says, &StatusCopy::autopilot_says},
-    {"air", &dds::Status::air, &StatusCopy::air},
-    {"autopilot_version", &dds::Status::autopilot_version, &StatusCopy::autopilot_version},
-};
-
 /// The autopilot and its firmware's version: "ardupilot 4.6.3".
 inline std::string controller(const StatusCopy& s) {
-  return s.autopilot + (s.autopilot_version.empty() ? "" : " " + s.autopilot_version);
+  const std::string version = s.text(&dds::Status::autopilot_version);
+  return s.said.autopilot + (version.empty() ? "" : " " + version);
 }
 
 /// An age or a delay of the status, s; −1 on the wire: nothing was measured for it yet.
@@ -107,7 +88,7 @@ class Station {
   const dds::Participant& participant() const noexcept { return participant_; }
   /// Whether this status knows of a later command than ours, whoever gave it.
   bool superseded(const StatusCopy& s) const noexcept {
-    return s.numbers.session != session_ || s.numbers.sequence_number != sequence_;
+    return s.said.session != session_ || s.said.sequence_number != sequence_;
   }
   /// The next status; nothing after the timeout.
   std::optional<StatusCopy> status(double timeout_s);

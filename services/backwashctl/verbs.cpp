@@ -6,13 +6,16 @@
 #include <chrono>
 #include <cstdio>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "services/backwashctl/answer.hpp"
+#include "services/backwashctl/preflight.hpp"
 #include "services/backwashctl/route.hpp"
 #include "services/backwashctl/status_output.hpp"
 #include "services/command_line/exit_code.hpp"
 #include "services/command_line/words.hpp"
+#include "services/dds/air_text.hpp"
 
 namespace backwash::ctl {
 namespace {
@@ -27,20 +30,20 @@ std::string default_station() {
 constexpr std::string_view kNotToldYet = "no value of ";  // how such a refusal begins
 
 bool tracking(const StatusCopy& s) { return s.in(Mode::tracking); }
-bool rests(const StatusCopy& s) { return tracking(s) && !s.numbers.moving; }
+bool rests(const StatusCopy& s) { return tracking(s) && !s.said.moving; }
 /// A task that is not done counts: a route may pass its last place on the way, and a turn begins where it ends.
 std::function<bool(const StatusCopy&)> rests_at(const Vec3& goal) {
   return [goal](const StatusCopy& s) {
-    const auto& p = s.numbers.setpoint;
-    return rests(s) && s.task.empty() && (Vec3(p.x, p.y, p.z) - goal).norm() < 0.01;
+    const auto& p = s.said.setpoint;
+    return rests(s) && s.text(&dds::Status::task).empty() && (Vec3(p.x, p.y, p.z) - goal).norm() < 0.01;
   };
 }
 
 /// The measured height counts: a set-point is there before the vehicle is.
 bool risen(const StatusCopy& s) {
   constexpr double kNear = 0.1;  // m
-  return rests(s) && !s.numbers.landed && s.task.empty() &&
-         std::abs(s.numbers.position.z - s.numbers.setpoint.z) < kNear;
+  return rests(s) && !s.said.landed && s.text(&dds::Status::task).empty() &&
+         std::abs(s.said.position.z - s.said.setpoint.z) < kNear;
 }
 
 }  // namespace
@@ -147,14 +150,14 @@ void Verbs::add_ends(Command& app) {
                "stop --wait",
                [this] {
                  return command("stop", backwash_msgs_msg_dds__COMMAND_STOP, Vec3::Zero(), [](const StatusCopy& s) {
-                   return s.in(Mode::passive) || (s.in(Mode::hold) && !s.numbers.moving);
+                   return s.in(Mode::passive) || (s.in(Mode::hold) && !s.said.moving);
                  });
                }),
           20);
   waiting(verb(app, "land", "land below, with the autopilot's own landing", "land --wait",
                [this] {
                  return command("land", backwash_msgs_msg_dds__COMMAND_LAND, Vec3::Zero(),
-                                [](const StatusCopy& s) { return s.in(Mode::passive) && !s.numbers.armed; });
+                                [](const StatusCopy& s) { return s.in(Mode::passive) && !s.said.armed; });
                }),
           60);
 }
@@ -208,10 +211,13 @@ int Verbs::command(const std::string& name, std::uint8_t verb, const Vec3& posit
   std::string last = "no status";
   bool superseded = false, set_out = false;
   const bool reached = station.wait(patience_s_, done, [&](const StatusCopy& s) {
-    last = s.state + " (" + s.reason + ")" + (s.task.empty() ? "" : ", " + s.task) +
-           (s.autopilot_says.empty() ? "" : "; the autopilot says: " + s.autopilot_says);
+    last = s.text(&dds::Status::state) + " (" + s.text(&dds::Status::reason) + ")" +
+           (s.text(&dds::Status::task).empty() ? "" : ", " + s.text(&dds::Status::task)) +
+           (s.text(&dds::Status::autopilot_says).empty()
+                ? ""
+                : "; the autopilot says: " + s.text(&dds::Status::autopilot_says));
     superseded = station.superseded(s);
-    if (superseded || s.task.starts_with(kRefusedTask)) return true;
+    if (superseded || s.text(&dds::Status::task).starts_with(kRefusedTask)) return true;
     // On its way to a goal it goes on by itself after an obstacle. A hold that was there before is not its end.
     const bool on_its_way =
         verb == backwash_msgs_msg_dds__COMMAND_GOTO || verb == backwash_msgs_msg_dds__COMMAND_GOTO_FACING ||
@@ -278,6 +284,84 @@ int Verbs::watch() {
       std::cerr << "no status for 2 s\n";
   }
   return 0;
+}
+
+int Verbs::check() {
+  constexpr double kWatch = 2.0, kAsked = 15.0;  // s
+  Station station(options_);
+  const auto before = station.status(options_.timeout_s);
+  auto after = before;
+  const auto begun = std::chrono::steady_clock::now();
+  const auto since = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(); };
+  // What an autopilot has, and what it has not, takes longer to ask for than rates to count.
+  while (after && !interrupted() && since() < (after->advises(dds::kAsking) ? kAsked : kWatch))
+    after = station.status(1.0);
+  if (!after) {
+    std::cerr << "backwashctl check: " << nobody() << "\n";
+    return kUnavailable;
+  }
+  bool all = true;
+  nlohmann::json lines = nlohmann::json::array();
+  for (const Finding& f : preflight(*before, *after, since())) {
+    all = all && f.good;
+    lines.push_back({{"name", f.name}, {"good", f.good}, {"found", f.found}, {"advice", f.advice}});
+    if (!json_)
+      std::cout << (f.good ? "good  " : "FAIL  ") << f.name << ": " << f.found << (f.good ? "" : " -> " + f.advice)
+                << "\n";
+  }
+  if (json_) std::cout << text_of({{"good", all}, {"findings", lines}}, 2) << "\n";
+  return all ? 0 : kUnavailable;
+}
+
+void Verbs::add_adaptation(Command& app) {
+  auto* sub = verb(app, "adaptation", "what was learnt of the air: factor by class, its evidence and time of flight",
+                   "adaptation --json", [this] { return adaptation(); });
+  sub->add_option("what", air_order_,
+                  "show; freeze: the factors stay as they are; thaw: they follow the evidence again, also that of "
+                  "meanwhile; reset: nothing counts any more, only disarmed and not enabled")
+      .capture_default_str()
+      .check(services::one_of({"show", "freeze", "thaw", "reset"}));
+}
+
+int Verbs::adaptation() {
+  const auto ask = [this](std::uint8_t verb) { return command("adaptation " + air_order_, verb, Vec3::Zero(), {}); };
+  if (air_order_ == "reset") return ask(backwash_msgs_msg_dds__COMMAND_AIR_RESET);
+  if (air_order_ == "freeze") return ask(backwash_msgs_msg_dds__COMMAND_AIR_FREEZE);
+  if (air_order_ == "thaw") return ask(backwash_msgs_msg_dds__COMMAND_AIR_THAW);
+  Station station(options_);
+  const auto now = station.status(options_.timeout_s);
+  if (!now) return services::say_error("backwashctl adaptation", nobody()), kUnavailable;
+  const auto air = dds::air_said(now->text(&dds::Status::air));
+  if (!air && !now->text(&dds::Status::air).empty())
+    return services::say_error("backwashctl adaptation",
+                               "the daemon is of another version: it says '" + now->text(&dds::Status::air) + "'"),
+           kUnavailable;
+  if (json_)
+    std::cout << json_of(air).dump(2) << "\n";
+  else
+    print(air);
+  return kOk;
+}
+
+void Verbs::add_map(Command& app) {
+  auto* sub = verb(app, "map", "send a map and wait until the daemon has it in use; on a bad line too",
+                   "map floor.bt --patience 60", [this] { return map(); });
+  sub->add_option("file", map_.file, "OctoMap, or builtin:NAME").required();
+  sub->add_option("--frame", map_.frame, "that the map is in: the daemon's frames.map").capture_default_str();
+  sub->add_option("--rate", map_.rate_kbit_s, "kbit/s that the line carries; slower lines are noticed")
+      .capture_default_str()
+      .check(services::within(64, 1e6));
+  sub->add_option("--patience", map_.patience_s, "s without a newly acknowledged part until it is given up")
+      .capture_default_str()
+      .check(services::positive());
+}
+
+int Verbs::map() {
+  try {
+    return say(send_map(options_, map_, json_), json_);
+  } catch (const dds::NotPermitted& e) {
+    return say({"map", false, std::nullopt, std::string("refused: ") + e.what()}, json_);
+  }
 }
 
 }  // namespace backwash::ctl

@@ -26,6 +26,7 @@
 #include "firmware_bridge/parameters.hpp"
 #include "services/backwashd/map_news.hpp"
 #include "services/backwashd/timing.hpp"
+#include "services/dds/topics.hpp"
 
 /// What the daemon's threads hand to each other. Every member has exactly one writing and one reading thread and is
 /// wait-free; the picture is in services/backwashd/README.md.
@@ -111,7 +112,7 @@ struct ControlView {
   std::int64_t t_ns = 0;
   Mode mode = Mode::passive;
   Reason reason = Reason::started;
-  bool armed = false, offboard = false, aligned = false;                     ///< as in track::AutopilotFacts
+  bool armed = false, offboard = false;                                      ///< as in track::AutopilotFacts
   std::optional<bool> landed;                                                ///< as in track::TickOutput
   std::optional<firmware_bridge::ClockOffset> clock;                         ///< the autopilot's
   static constexpr double kNever = std::numeric_limits<double>::infinity();  ///< an age before the first, s
@@ -128,10 +129,9 @@ struct ControlView {
   std::uint32_t closures = 0;         ///< loop closures seen: the map frame of state and command
   track::RigidShift shift;            ///< from the segment's frame into that one
   std::uint64_t refused_segment = 0;  ///< the last one refused
-  std::uint64_t ticks = 0, missed = 0, setpoints = 0, inside = 0, outside = 0;
-  std::uint64_t odometry_received = 0, odometry_rejected = 0, frames_bad = 0, page_faults = 0;
-  std::uint64_t frames_refused = 0;  ///< of the link, for their signature
-  double residual_m = 0, residual_rad = 0;
+  std::uint64_t ticks = 0;
+  dds::Status shown{};                 ///< what no thread decides by, as it is sent: counts, residual of the heading
+  double residual_m = 0;               ///< of the frames
   Mismatch mismatch = Mismatch::none;  ///< of the frames: then enabling is refused
   firmware_bridge::SwitchState stop_switch = firmware_bridge::SwitchState::absent;
   const firmware_bridge::AutopilotProfile* autopilot = &firmware_bridge::kUnknownAutopilot;

@@ -9,8 +9,9 @@
 #include <iterator>
 #include <thread>
 
+#include "services/backwashd/shown_diagnostics.hpp"
+#include "services/backwashd/shown_status.hpp"
 #include "services/backwashd/text.hpp"
-#include "services/dds/packet_filter.hpp"
 #include "services/parallel/real_time.hpp"
 
 namespace backwash::daemon {
@@ -227,6 +228,40 @@ void DdsFront::run_readers() {
       channels_.foreign_writers += news.count - 1;
       refusals_.add(channels_.foreign_writers, [&] { return printable(news.first, 240) + ": it is not listened to"; });
     }
+  }
+}
+
+void DdsFront::run_status(const Vehicle& vehicle, const Recorder& recorder) {
+  ControlView view;
+  CommandId accepted;
+  Line task{}, place{}, refused{};
+  auto next = std::chrono::steady_clock::now();
+  constexpr int kDiagnosticsEvery = 10;
+  int rounds = 0;
+  while (!channels_.stop) {
+    next += std::chrono::milliseconds(100);
+    std::this_thread::sleep_until(next);
+    if (const auto newest = channels_.task.read_new()) task = *newest;
+    if (const auto newest = channels_.accepted.read_new()) accepted = *newest;
+    if (const auto newest = channels_.view_status.read_new()) view = *newest;
+    if (const auto newest = channels_.place.read_new()) place = *newest;
+    for (auto* line : {&channels_.refused, &channels_.refused_map})
+      if (const auto newest = line->read_new()) refused = *newest;
+    commanding_ = track::commanding(view.mode);
+    ShownStatus shown(view, vehicle, channels_);
+    dds::Status& s = shown.message();
+    s.records_lost = channels_.records_lost() + recorder.lost();
+    s.task = task.data();
+    s.place = place.data();
+    s.refused = refused.data();
+    s.session = accepted.session;
+    s.sequence_number = accepted.sequence;
+    status_.write(s);
+    if (const auto& moved = transforms_.message(now_ns()); tf_ && moved.transforms._length > 0) tf_->write(moved);
+    const auto now = firmware_bridge::Time::clock::now();
+    if (const auto* battery = shown_battery_.next(view.battery, now, dds::nanoseconds(s.stamp)))
+      battery_.write(*battery);
+    if (rounds++ % kDiagnosticsEvery == 0) diagnostics_.write(ShownDiagnostics(s, name_space_).message());
   }
 }
 

@@ -37,10 +37,9 @@ std::uint8_t level_of(const dds::Status& s, bool doubted) {
 
 }  // namespace
 
-void ShownDiagnostics::add(const char* key, std::string value) {
-  texts_.at(count_) = std::move(value);
-  values_.at(count_) = {const_cast<char*>(key), dds::c_string(texts_.at(count_))};  // a literal, which ends
-  ++count_;
+void ShownDiagnostics::add(std::string key, std::string value) {
+  char* const name = texts_.emplace_back(std::move(key)).data();
+  values_.push_back({name, texts_.emplace_back(std::move(value)).data()});
 }
 
 ShownDiagnostics::ShownDiagnostics(const dds::Status& s, const std::string& name_space)
@@ -48,21 +47,23 @@ ShownDiagnostics::ShownDiagnostics(const dds::Status& s, const std::string& name
   static const std::string nowhere;
   const std::string why = doubt(s);
   said_ = text(s.state) + ": " + text(s.reason) + (why.empty() ? "" : "; " + why);
-  add("task", text(s.task));
-  add("place", text(s.place));
-  add("refused", text(s.refused));
-  add("odometry_age_s", number("%.3f", s.odometry_age));
-  add("heartbeat_age_s", number("%.3f", s.heartbeat_age));
-  add("map_age_s", number("%.1f", s.map_age));
-  add("ticks_missed", std::to_string(s.ticks_missed));
-  add("tick_us_p99", number("%.0f", s.tick.p99));
-  add("samples_inside", std::to_string(s.samples_inside));
-  add("samples_outside", std::to_string(s.samples_outside));
+  dds::each_status_member([&]<typename T>(const dds::StatusMember<T>& member) {
+    if (!member.diagnosed) return;
+    if constexpr (std::is_same_v<T, char*>)
+      add(member.key, text(s.*member.at));
+    else if constexpr (std::is_same_v<T, dds::Timing>)
+      add(std::string(member.key) + "_p99", number(member.diagnosed, static_cast<double>((s.*member.at).p99)));
+    else if constexpr (std::is_same_v<T, double>)
+      add(member.key, number(member.diagnosed, s.*member.at));
+    else if constexpr (std::is_integral_v<T>)
+      add(member.key, std::to_string(s.*member.at));
+  });
+  const auto count = static_cast<std::uint32_t>(values_.size());
   status_ = {level_of(s, !why.empty()),
              dds::c_string(name_),
              dds::c_string(said_),
              dds::c_string(name_space),
-             {count_, count_, values_.data(), false}};
+             {count, count, values_.data(), false}};
   message_ = {{s.stamp, dds::c_string(nowhere)}, {1, 1, &status_, false}};
 }
 

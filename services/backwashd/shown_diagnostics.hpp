@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
+#include <deque>
 #include <string>
+#include <vector>
 
-#include "services/dds/topics.hpp"
+#include "services/dds/status_members.hpp"
 
 namespace backwash::daemon {
 
@@ -22,13 +23,11 @@ class ShownDiagnostics {
   const dds::DiagnosticArray& message() const noexcept { return message_; }
 
  private:
-  static constexpr std::size_t kValues = 10;
-  void add(const char* key, std::string value);
+  void add(std::string key, std::string value);
 
   std::string name_, said_;
-  std::array<std::string, kValues> texts_;
-  std::array<dds::KeyValue, kValues> values_{};
-  std::uint32_t count_ = 0;
+  std::deque<std::string> texts_;
+  std::vector<dds::KeyValue> values_;
   dds::DiagnosticStatus status_{};
   dds::DiagnosticArray message_{};
 };

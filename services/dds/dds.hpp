@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "idl/topics.hpp"
+
 struct dds_topic_descriptor;
 
 /// Thin ownership around Cyclone DDS's C binding: what the daemon, the ground station and the bench share. Only the
@@ -32,18 +34,6 @@ struct NotPermitted : Error {
 using Entity = std::int32_t;
 
 constexpr double kLease_s = 2;
-
-/// Delivery of a topic.
-enum class Delivery {
-  latest,    ///< best effort, keep last 1: odometry
-  status,    ///< sent reliably, keep last 1: whoever reads is matched, and holds up nobody; read best effort
-  sent_tf,   ///< reliable, keep last 100: transforms, as ROS 2's broadcasters send them
-  tf,        ///< best effort, keep last 64: transforms of all, ours among them
-  scans,     ///< best effort, keep last 8: point clouds, as ROS 2 drivers send sensor data
-  parts,     ///< best effort, keep last 64: parts of maps and their receipts, which say themselves what is missing
-  reliable,  ///< reliable, keep last 64, a writer's liveliness has a lease of kLease_s: commands and acknowledgements
-  state,     ///< reliable, transient local, keep last 1: late joiners get the newest: map, trajectory, tube
-};
 
 /// How a participant receives.
 struct Receiving {

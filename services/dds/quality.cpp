@@ -2,10 +2,9 @@
 #include "services/dds/quality.hpp"
 
 #include <dds/dds.h>
+#include <type_hashes.hpp>
 
 #include <string>
-
-#include "services/dds/type_hashes.hpp"
 
 namespace backwash::dds {
 namespace {

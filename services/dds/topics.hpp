@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "backwash_msgs.h"
 #include "ros2.h"
 #include "services/dds/dds.hpp"
 
-/// The topics of docs/interfaces.md: name, type and delivery in one place.
+/// Messages by their names here, and the topic of each (idl/topics.hpp).
 namespace backwash::dds {
 
 using Odometry = nav_msgs_msg_dds__Odometry_;
@@ -60,106 +62,53 @@ inline builtin_interfaces_msg_dds__Time_ wall_clock() {
           static_cast<std::uint32_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(since - s).count())};
 }
 
+/// Which of kTopics has this name.
+consteval std::size_t topic_named(std::string_view name) {
+  return static_cast<std::size_t>(std::ranges::find(kTopics, name, &Topic::name) - kTopics);
+}
+template <const dds_topic_descriptor& descriptor, std::size_t row>
+struct Typed {
+  static const dds_topic_descriptor& type() { return descriptor; }
+  static constexpr const char* kName = kTopics[row].name.data();  // of a literal, which ends
+  static constexpr Delivery kDelivery = kTopics[row].delivery;
+};
+
+/// The topic of a type: TopicOf<Status>::kName.
 template <typename T>
 struct TopicOf;
 template <>
-struct TopicOf<Odometry> {
-  static const dds_topic_descriptor& type() { return nav_msgs_msg_dds__Odometry__desc; }
-  static constexpr const char* kName = "odometry";
-  static constexpr Delivery kDelivery = Delivery::latest;
-};
+struct TopicOf<Odometry> : Typed<nav_msgs_msg_dds__Odometry__desc, topic_named("odometry")> {};
 template <>
-struct TopicOf<Octomap> {
-  static const dds_topic_descriptor& type() { return octomap_msgs_msg_dds__Octomap__desc; }
-  static constexpr const char* kName = "map";
-  static constexpr Delivery kDelivery = Delivery::state;
-};
+struct TopicOf<Octomap> : Typed<octomap_msgs_msg_dds__Octomap__desc, topic_named("map")> {};
 template <>
-struct TopicOf<PointCloud> {
-  static const dds_topic_descriptor& type() { return sensor_msgs_msg_dds__PointCloud2__desc; }
-  static constexpr const char* kName = "points";
-  static constexpr Delivery kDelivery = Delivery::scans;
-};
+struct TopicOf<PointCloud> : Typed<sensor_msgs_msg_dds__PointCloud2__desc, topic_named("points")> {};
 template <>
-struct TopicOf<Disturbance> {
-  static const dds_topic_descriptor& type() { return sensor_msgs_msg_dds__PointCloud2__desc; }
-  static constexpr const char* kName = "disturbance";
-  static constexpr Delivery kDelivery = Delivery::state;
-};
+struct TopicOf<Disturbance> : Typed<sensor_msgs_msg_dds__PointCloud2__desc, topic_named("disturbance")> {};
 template <>
-struct TopicOf<TransformStamped> {
-  static const dds_topic_descriptor& type() { return geometry_msgs_msg_dds__TransformStamped__desc; }
-  static constexpr const char* kName = "loop_closure";
-  static constexpr Delivery kDelivery = Delivery::state;
-};
+struct TopicOf<TransformStamped> : Typed<geometry_msgs_msg_dds__TransformStamped__desc, topic_named("loop_closure")> {};
 template <>
-struct TopicOf<Command> {
-  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__Command__desc; }
-  static constexpr const char* kName = "command";
-  static constexpr Delivery kDelivery = Delivery::reliable;
-};
+struct TopicOf<Command> : Typed<backwash_msgs_msg_dds__Command__desc, topic_named("command")> {};
 template <>
-struct TopicOf<Ack> {
-  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__Ack__desc; }
-  static constexpr const char* kName = "ack";
-  static constexpr Delivery kDelivery = Delivery::reliable;
-};
+struct TopicOf<Ack> : Typed<backwash_msgs_msg_dds__Ack__desc, topic_named("ack")> {};
 template <>
-struct TopicOf<Status> {
-  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__Status__desc; }
-  static constexpr const char* kName = "status";
-  static constexpr Delivery kDelivery = Delivery::status;
-};
+struct TopicOf<Status> : Typed<backwash_msgs_msg_dds__Status__desc, topic_named("status")> {};
 template <>
-struct TopicOf<MapPart> {
-  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__MapPart__desc; }
-  static constexpr const char* kName = "map_part";
-  static constexpr Delivery kDelivery = Delivery::parts;
-};
+struct TopicOf<MapPart> : Typed<backwash_msgs_msg_dds__MapPart__desc, topic_named("map_part")> {};
 template <>
-struct TopicOf<MapReceipt> {
-  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__MapReceipt__desc; }
-  static constexpr const char* kName = "map_receipt";
-  static constexpr Delivery kDelivery = Delivery::parts;
-};
+struct TopicOf<MapReceipt> : Typed<backwash_msgs_msg_dds__MapReceipt__desc, topic_named("map_receipt")> {};
 template <>
-struct TopicOf<Tube> {
-  static const dds_topic_descriptor& type() { return backwash_msgs_msg_dds__ReachTube__desc; }
-  static constexpr const char* kName = "tube";
-  static constexpr Delivery kDelivery = Delivery::state;
-};
+struct TopicOf<Tube> : Typed<backwash_msgs_msg_dds__ReachTube__desc, topic_named("tube")> {};
 template <>
-struct TopicOf<Path> {
-  static const dds_topic_descriptor& type() { return nav_msgs_msg_dds__Path__desc; }
-  static constexpr const char* kName = "trajectory";
-  static constexpr Delivery kDelivery = Delivery::state;
-};
-
+struct TopicOf<Path> : Typed<nav_msgs_msg_dds__Path__desc, topic_named("trajectory")> {};
 template <>
-struct TopicOf<MarkerArray> {
-  static const dds_topic_descriptor& type() { return visualization_msgs_msg_dds__MarkerArray__desc; }
-  static constexpr const char* kName = "markers";
-  static constexpr Delivery kDelivery = Delivery::state;
-};
+struct TopicOf<MarkerArray> : Typed<visualization_msgs_msg_dds__MarkerArray__desc, topic_named("markers")> {};
 template <>
-struct TopicOf<BatteryState> {
-  static const dds_topic_descriptor& type() { return sensor_msgs_msg_dds__BatteryState__desc; }
-  static constexpr const char* kName = "battery";
-  static constexpr Delivery kDelivery = Delivery::state;
-};
-
-/// ROS 2's one topic of diagnostics: of all robots of a domain, outside every name space.
-constexpr const char* kDiagnostics = "rt/diagnostics";
-/// ROS 2's one topic of transforms: of all robots of a domain, who differ in their frames.
-constexpr const char* kTf = "rt/tf";
+struct TopicOf<BatteryState> : Typed<sensor_msgs_msg_dds__BatteryState__desc, topic_named("battery")> {};
 
 /// All topics of the vehicle with this name space, and diagnostics, and `more`: for Receiving::topics.
 inline std::vector<std::string> topics(const std::string& name_space, std::vector<std::string> more = {}) {
   more.push_back(kDiagnostics);
-  const auto add = [&]<typename... T>(TopicOf<T>...) { (more.push_back(topic(name_space, TopicOf<T>::kName)), ...); };
-  add(TopicOf<Odometry>(), TopicOf<Octomap>(), TopicOf<PointCloud>(), TopicOf<Disturbance>(),
-      TopicOf<TransformStamped>(), TopicOf<Command>(), TopicOf<Ack>(), TopicOf<Status>(), TopicOf<MapPart>(),
-      TopicOf<MapReceipt>(), TopicOf<Tube>(), TopicOf<Path>(), TopicOf<MarkerArray>(), TopicOf<BatteryState>());
+  for (const Topic& each : kTopics) more.push_back(topic(name_space, std::string(each.name)));
   return more;
 }
 

@@ -15,13 +15,9 @@ namespace backwash::security {
 /// cannot speak as another.
 enum class Protection { encrypt, sign };
 
-enum class Role {
-  vehicle,  ///< answers, status, battery, tube, trajectory, markers, disturbance; the diagnostics and transforms of ROS
-            ///< 2
-  station,  ///< commands
-  observer,  ///< nothing
-  vio,       ///< odometry, loop closures, maps, points
-};
+/// What each may write is in idl/topics.hpp; a vehicle also the diagnostics and transforms of ROS 2, an observer
+/// nothing.
+enum class Role { vehicle, station, observer, vio };
 inline constexpr Role kRoles[] = {Role::vehicle, Role::station, Role::observer, Role::vio};
 const char* name(Role role) noexcept;
 

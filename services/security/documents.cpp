@@ -5,6 +5,8 @@
 #include <ctime>
 #include <string_view>
 
+#include "idl/topics.hpp"
+
 namespace backwash::security {
 namespace {
 
@@ -26,25 +28,16 @@ std::string time_of(std::int64_t s) {
   return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &parts)};
 }
 
+bool writes(Role role, const dds::Writers& writers) {
+  return (role == Role::vehicle && writers.vehicle) || (role == Role::station && writers.station) ||
+         (role == Role::vio && writers.vio);
+}
+
 std::vector<std::string> writable(const Grant& grant) {
   std::vector<std::string> topics;
-  const auto add = [&](std::initializer_list<const char*> names) {
-    for (const char* name : names) topics.push_back("rt/" + grant.name_space + "/" + name);
-  };
-  switch (grant.role) {
-    case Role::vehicle:
-      add({"ack", "status", "tube", "trajectory", "markers", "disturbance", "map_receipt", "battery"});
-      topics.insert(topics.end(), {"rt/diagnostics", "rt/tf"});
-      break;
-    case Role::station:
-      add({"command", "map_part"});
-      break;
-    case Role::vio:
-      add({"odometry", "loop_closure", "map", "points", "map_part"});
-      break;
-    case Role::observer:
-      break;
-  }
+  for (const dds::Topic& topic : dds::kTopics)
+    if (writes(grant.role, topic.writers)) topics.push_back("rt/" + grant.name_space + "/" + std::string(topic.name));
+  if (grant.role == Role::vehicle) topics.insert(topics.end(), {dds::kDiagnostics, dds::kTf});
   topics.insert(topics.end(), grant.topics.begin(), grant.topics.end());
   return topics;
 }

@@ -177,16 +177,14 @@ Counts flown(const Course& course, double strength, bool learns, int flights, do
     AirFlight flight(course, strength, first_seed() + static_cast<std::uint64_t>(n), learns);
     flight.take_off();
     flight.rest(rest_s);
-    const auto [inside, outside] = std::pair(flight.rig().view().inside, flight.rig().view().outside);
+    const auto [inside, outside] =
+        std::pair(flight.rig().view().shown.samples_inside, flight.rig().view().shown.samples_outside);
     flight.legs();
-    c.touched += flight.clearance() <= 0;
-    c.arrived += flight.arrived();
-    c.told += flight.told();
-    c.refused += flight.refused();
-    c.rougher += flight.rig().largest_factor() > 1;
-    c.factor = std::max(c.factor, flight.rig().largest_factor());
-    c.inside += flight.rig().view().inside - inside;
-    c.outside += flight.rig().view().outside - outside;
+    c.touched += flight.clearance() <= 0, c.arrived += flight.arrived(), c.told += flight.told();
+    c.refused += flight.refused(), c.rougher += flight.rig().largest_factor() > 1,
+        c.factor = std::max(c.factor, flight.rig().largest_factor());
+    c.inside += flight.rig().view().shown.samples_inside - inside,
+        c.outside += flight.rig().view().shown.samples_outside - outside;
     c.clearance = std::min(c.clearance, flight.clearance());
   }
   std::printf(
@@ -260,10 +258,8 @@ TEST(AirFlights, AfterARestInCalmAirSetsAreNarrowerAndNoMoreSamplesLeaveThemThan
         after += flight.half_width() / n;
         least = std::min(least, *std::ranges::min_element(flight.rig().view().air->factors));
         flight.legs();
-        inside += flight.rig().view().inside;
-        outside += flight.rig().view().outside;
-        touched += flight.clearance() <= 0;
-        arrived += flight.arrived();
+        inside += flight.rig().view().shown.samples_inside, outside += flight.rig().view().shown.samples_outside;
+        touched += flight.clearance() <= 0, arrived += flight.arrived();
       }
       std::printf(
           "%-10s x%g rests %g s, %d flights: half width %.3f -> %.3f m, factor down to %.2f; %d touched, %d flew all "
@@ -291,7 +287,7 @@ TEST(AirFlights, AFlightWhoseWayIsNotClearInTheAirAsLearntIsHeldOnAVerifiedStopA
   EXPECT_TRUE(rig.view().finished);
   EXPECT_LT(rig.view().state.v_W.norm(), 0.1);
   EXPECT_LT(rig.view().state.p_W.x(), 2.9) << "before the gap";
-  EXPECT_EQ(rig.view().outside, 0u);
+  EXPECT_EQ(rig.view().shown.samples_outside, 0u);
   EXPECT_GT(flight.clearance(), 0);
   EXPECT_EQ(std::ranges::count(flight.texts(), to_string(Reason::air_rougher)), 1) << "to the operator";
   EXPECT_NE(flight.ask(PlanJob::Kind::go_to, kTightGap.goal_W), "") << "there is no way through any more";

@@ -44,8 +44,8 @@ TEST(Tick, NeitherAllocatesNorLocksNorReadsTheWallClockNorFaultsAPageInAWholeFli
   EXPECT_TRUE(rig.channels->orders.push({track::Request::land}));
   ASSERT_GT(rig.ticks_until(Mode::passive, 600), 0);
   EXPECT_EQ(rig.reason(), Reason::landed);
-  EXPECT_GT(rig.view().inside, 340u);  // the lift-off is not judged
-  EXPECT_EQ(rig.view().outside, 0u);
+  EXPECT_GT(rig.view().shown.samples_inside, 340u);  // the lift-off is not judged
+  EXPECT_EQ(rig.view().shown.samples_outside, 0u);
   EXPECT_EQ(rig.channels->control_log.lost(), 0u);
   if (locked && backwash::test::traps_work()) {  // a sanitizer's own bookkeeping touches new pages
     EXPECT_EQ(rig.page_faults_in_flight, 0);
@@ -107,7 +107,7 @@ TEST(LatePlanFault, WithoutANewTrajectoryTheVerifiedTailIsFlownAndItsEndIsHeld) 
     EXPECT_EQ(s.a_W, Vec3::Zero());
   }
   EXPECT_LT((rig.autopilot->truth().p_W - end).norm(), 0.15);
-  EXPECT_EQ(rig.view().outside, 0u);
+  EXPECT_EQ(rig.view().shown.samples_outside, 0u);
 }
 
 }  // namespace

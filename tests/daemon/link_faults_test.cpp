@@ -143,7 +143,7 @@ TEST(LineNoiseFault, GarbageBetweenFramesCostsNoGoodFrameAndNoTick) {
   const std::size_t from = rig.log.size();
   rig.ticks(150);
   EXPECT_EQ(rig.mode(), Mode::tracking) << to_string(rig.reason());
-  EXPECT_EQ(rig.view().outside, 0u);
+  EXPECT_EQ(rig.view().shown.samples_outside, 0u);
   rig.noise = nullptr;
   const std::size_t dirty = good;
   const std::size_t until = rig.log.size();
@@ -152,7 +152,7 @@ TEST(LineNoiseFault, GarbageBetweenFramesCostsNoGoodFrameAndNoTick) {
   EXPECT_GE(accepted(from), dirty + 20);
   // A false header waits for at most 280 bytes, 13 of the shortest frames.
   EXPECT_LE(dirty - std::min(dirty, accepted(from) - accepted(until)), 13u);
-  EXPECT_GT(rig.view().frames_bad, 0u);
+  EXPECT_GT(rig.view().shown.frames_bad, 0u);
 }
 
 TEST(LineNoiseFault, AFrameWithABitFlippedIsNeverActedOn) {
@@ -168,7 +168,7 @@ TEST(LineNoiseFault, AFrameWithABitFlippedIsNeverActedOn) {
   };
   rig.ticks(200);
   EXPECT_EQ(rig.mode(), Mode::tracking) << to_string(rig.reason());
-  EXPECT_GE(rig.view().frames_bad, 150u);
+  EXPECT_GE(rig.view().shown.frames_bad, 150u);
 }
 
 TEST(BaudRateFault, AWrongBaudRateIsANamedErrorAfterTwoSeconds) {

@@ -73,7 +73,7 @@ TEST_F(NumberFaults, ASingleBadNumberOfTheOdometryIsFlownPast) {
   Rig rig;
   rig.take_off();
   rig.start_route(0.5);
-  const std::uint64_t received = rig.view().odometry_received - rig.view().odometry_rejected;
+  const std::uint64_t received = rig.view().shown.odometry_received - rig.view().shown.odometry_rejected;
   int bad = 0;
   for (int n = 0; n < 10; ++n)
     for (const double value : kBad) {
@@ -84,7 +84,8 @@ TEST_F(NumberFaults, ASingleBadNumberOfTheOdometryIsFlownPast) {
       ++bad;
       ASSERT_EQ(rig.mode(), Mode::tracking) << "member " << n << " = " << value << ": " << to_string(rig.reason());
     }
-  EXPECT_EQ(rig.view().odometry_received - rig.view().odometry_rejected, received + 2 * static_cast<unsigned>(bad));
+  EXPECT_EQ(rig.view().shown.odometry_received - rig.view().shown.odometry_rejected,
+            received + 2 * static_cast<unsigned>(bad));
 }
 
 // The autopilot's own messages: floats, so what is beyond a float cannot come, but the largest float can.

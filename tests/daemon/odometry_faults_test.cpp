@@ -172,16 +172,16 @@ TEST(VioStampFault, DuplicatesAndStampsThatGoBackAreDroppedAndMoreThanThreeInARo
     Lockstep rig;
     rig.take_off();
     rig.start_route(2);
-    const std::uint64_t rejected = rig.view().odometry_rejected;
+    const std::uint64_t rejected = rig.view().shown.odometry_rejected;
     std::int64_t stamp = rig.now_ns() - back_ns;
     const auto spoil = [&](OdometrySample& s) { s.stamp_ns = stamp; };
     rig.spoil = spoil;
     rig.ticks(3);
-    EXPECT_EQ(rig.view().odometry_rejected - rejected, 3u);
+    EXPECT_EQ(rig.view().shown.odometry_rejected - rejected, 3u);
     EXPECT_EQ(rig.mode(), Mode::tracking);
     rig.spoil = nullptr;
     rig.ticks(10);
-    EXPECT_EQ(rig.view().odometry_rejected - rejected, 3u);
+    EXPECT_EQ(rig.view().shown.odometry_rejected - rejected, 3u);
     EXPECT_EQ(rig.mode(), Mode::tracking);
     const std::int64_t last = rig.now_ns();
     stamp = last - back_ns;
@@ -243,9 +243,9 @@ TEST(OutsideTheSetFault, AnErrorOutsideItsSetIsAnEventAtOnceAndHoldsAfterThreeTi
   int outside = 0;
   for (int n = 0; n < 60 && rig.mode() == Mode::tracking; ++n) {
     rig.tick();
-    outside = rig.view().outside > 0 ? outside + 1 : 0;
+    outside = rig.view().shown.samples_outside > 0 ? outside + 1 : 0;
   }
-  EXPECT_EQ(rig.view().outside, 3u);
+  EXPECT_EQ(rig.view().shown.samples_outside, 3u);
   EXPECT_EQ(outside, 3);
   EXPECT_EQ(rig.mode(), Mode::hold);
   EXPECT_EQ(rig.reason(), Reason::outside_set);
@@ -256,7 +256,7 @@ TEST(WallClockFault, AStepOfTheViosByAnHourChangesNothing) {
     Lockstep rig;
     rig.take_off();
     rig.start_route(1);
-    const std::uint64_t rejected = rig.view().odometry_rejected, missed = rig.view().missed;
+    const std::uint64_t rejected = rig.view().shown.odometry_rejected, missed = rig.view().shown.ticks_missed;
     rig.spoil = [=](OdometrySample& s) { s.stamp_ns += hours * 3600 * 1'000'000'000; };
     for (int n = 0; n < 150; ++n) {
       // What is forwarded is in the clock of our answers to TIMESYNC all the same.
@@ -264,9 +264,9 @@ TEST(WallClockFault, AStepOfTheViosByAnHourChangesNothing) {
       EXPECT_LE(std::abs(static_cast<double>(rig.wire().odometry_us) - static_cast<double>(rig.now_ns()) * 1e-3), 1000);
     }
     EXPECT_EQ(rig.mode(), Mode::tracking) << to_string(rig.reason());
-    EXPECT_EQ(rig.view().odometry_rejected, rejected);
-    EXPECT_EQ(rig.view().missed, missed);
-    EXPECT_EQ(rig.view().outside, 0u);
+    EXPECT_EQ(rig.view().shown.odometry_rejected, rejected);
+    EXPECT_EQ(rig.view().shown.ticks_missed, missed);
+    EXPECT_EQ(rig.view().shown.samples_outside, 0u);
   }
 }
 

@@ -29,7 +29,7 @@ TEST(MissedDeadlineFault, OneMissedDeadlineIsLoggedThreeInASecondHoldTwentyFiveI
     }
     EXPECT_EQ(rig.mode(), Mode::tracking);
     EXPECT_EQ(missed_events(rig), 6u);
-    EXPECT_EQ(rig.view().missed, 6u);
+    EXPECT_EQ(rig.view().shown.ticks_missed, 6u);
   }
   {
     InFlight rig;
@@ -74,7 +74,7 @@ TEST(Hold, WithATrustedPoseRestsOnTheVerifiedStopWithinTheLimits) {
   EXPECT_EQ(last.v_W, Vec3::Zero());
   EXPECT_LT(moving, 100);
   EXPECT_LT((last.p_W - from).norm(), 1.6);
-  EXPECT_EQ(rig.view().outside, 0u) << "braking left its verified sets";
+  EXPECT_EQ(rig.view().shown.samples_outside, 0u) << "braking left its verified sets";
   EXPECT_LT((rig.autopilot->truth().p_W - last.p_W).norm(), 0.15);
 }
 
@@ -82,9 +82,10 @@ TEST(PageFault, APageFaultInATickIsAnEvent) {
   Lockstep rig;
   rig.ticks(20);
   events(rig);
-  const std::uint64_t before = rig.view().page_faults;
+  const std::uint64_t before = rig.view().shown.page_faults;
   rig.ticks(20);
-  EXPECT_EQ(events(rig).empty(), rig.view().page_faults == before) << "the machine may take a page of its own accord";
+  EXPECT_EQ(events(rig).empty(), rig.view().shown.page_faults == before)
+      << "the machine may take a page of its own accord";
   rig.forget_pages();
   rig.tick();
   rig.tick();

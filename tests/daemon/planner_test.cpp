@@ -159,7 +159,7 @@ TEST_F(PlannerFlight, TheHeadingFollowsThePathWithinItsLimitsAndIsContinuousFrom
   EXPECT_LE(fastest_turn_, limits.rate + 1e-3);
   EXPECT_LE(hardest_turn_, limits.acceleration + 1e-2);
   EXPECT_GT(fastest_turn_, 0.9 * limits.rate) << "there was something to turn";
-  EXPECT_EQ(rig_.view().outside, 0u);
+  EXPECT_EQ(rig_.view().shown.samples_outside, 0u);
 }
 
 TEST_F(PlannerFlight, AHeadingAskedForIsTurnedToAtTheGoal) {
@@ -212,7 +212,7 @@ TEST_F(CrateAppears, ItIsBrakedForWithinTwoTicksAndFlownAroundWithoutComingToRes
   EXPECT_GT(slowest, 0.1);
   EXPECT_LT((last_->p_W - goal_).norm(), 0.03);
   EXPECT_GT(nearest_, vehicle_5in().body.radius);
-  EXPECT_EQ(rig_.view().outside, 0u);
+  EXPECT_EQ(rig_.view().shown.samples_outside, 0u);
 }
 
 TEST_F(CrateAppears, AnOperatorsStopEndsTheFlightAlsoWhileItBrakesForTheCrate) {
@@ -257,7 +257,7 @@ TEST_F(UnknownRoom, IsFlownThroughToAGoalBehindItsWallWithoutAContact) {
   EXPECT_LT((last_->p_W - goal).norm(), 0.03);
   EXPECT_GT(segments_, 3u);
   EXPECT_EQ(held_, 0);
-  EXPECT_EQ(rig_.view().outside, 0u);
+  EXPECT_EQ(rig_.view().shown.samples_outside, 0u);
   EXPECT_GT(nearest_, vehicle_5in().body.radius);
 }
 

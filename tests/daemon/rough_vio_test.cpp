@@ -71,7 +71,7 @@ TEST(PoseFaults, RoughFlightsOnANoisyVioAreNeverHeld) {
         if (rig.mode() != Mode::tracking) ++holds;
         ASSERT_EQ(rig.mode(), Mode::tracking)
             << to_string(rig.reason()) << ", seed " << seed << ", leg " << leg << ", tick " << n;
-        worst_drift = std::max(worst_drift, rig.view().residual_rad);
+        worst_drift = std::max(worst_drift, rig.view().shown.frame_residual_rad);
       }
       EXPECT_TRUE(rig.channels->orders.push({track::Request::stop}));
       for (int n = 0; n < 100; ++n, ++ticks) {

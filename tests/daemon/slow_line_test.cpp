@@ -58,7 +58,7 @@ TEST(SlowLine, AFlightAt57600BaudGetsEverySetpointInTimeAndOdometryAsOftenAsEsti
   EXPECT_LE(a.longest_gap_s, firmware_bridge::kLongestOdometryTicks * kControlPeriod + 1e-9);
   EXPECT_GE(a.odometry, kTicks / firmware_bridge::kLongestOdometryTicks);
   EXPECT_EQ(rig.mode(), Mode::tracking) << to_string(rig.reason());
-  EXPECT_EQ(rig.view().outside, 0U);
+  EXPECT_EQ(rig.view().shown.samples_outside, 0U);
 }
 
 // Else the test above could not fail.

@@ -105,15 +105,15 @@ TEST(SlowOdometry, ARouteIsFlownWithEverySampleInsideAndReplaysBitForBit) {
       fastest = std::max(fastest, rig.autopilot->truth().v_W.norm());
     }
     EXPECT_GT(fastest, 0.8) << what;
-    EXPECT_EQ(rig.view().outside, 0u) << what << ", of " << rig.view().inside;
-    EXPECT_GT(rig.view().inside, static_cast<std::uint64_t>(200 / estimator.every)) << what;
+    EXPECT_EQ(rig.view().shown.samples_outside, 0u) << what << ", of " << rig.view().shown.samples_inside;
+    EXPECT_GT(rig.view().shown.samples_inside, static_cast<std::uint64_t>(200 / estimator.every)) << what;
     EXPECT_LT((rig.autopilot->truth().p_W - Vec3(2, 0, 1.2)).norm(), 0.15) << what;
     const log::Replay replay = replayed(rig);
     EXPECT_EQ(replay.differing, 0u) << what << ": " << (replay.first ? replay.first->field : "");
     EXPECT_EQ(replay.ticks, rig.view().ticks) << what;
     const auto [first, later, clearance] = cost(rig);
     std::printf("%s: %lu inside, %lu outside; half width %.4f m, 0.2 s later %.4f m; clearance %.4f m\n", what.c_str(),
-                rig.view().inside, rig.view().outside, first, later, clearance);
+                rig.view().shown.samples_inside, rig.view().shown.samples_outside, first, later, clearance);
   }
 }
 
@@ -175,14 +175,11 @@ TEST(SlowOdometry, AnErrorOutsideItsSetIsAHoldTwoTicksAfterItsSample) {
   rig.take_off();
   rig.start_route(2);
   // No jump, no contradiction: the twist tells of the way.
-  rig.vio.spoil = [&](OdometrySample& s) {
-    s.state.p_W.y() += 0.08;
-    s.state.v_W.y() += 1.5;
-  };
-  const std::uint64_t before = rig.view().outside;
+  rig.vio.spoil = [&](OdometrySample& s) { s.state.p_W.y() += 0.08, s.state.v_W.y() += 1.5; };
+  const std::uint64_t before = rig.view().shown.samples_outside;
   int n = 0;
-  for (; n < 6 && rig.view().outside == before; ++n) rig.tick();
-  ASSERT_EQ(rig.view().outside, before + 1);
+  for (; n < 6 && rig.view().shown.samples_outside == before; ++n) rig.tick();
+  ASSERT_EQ(rig.view().shown.samples_outside, before + 1);
   EXPECT_EQ(rig.ticks_until(Mode::hold, 4), 2);
   EXPECT_EQ(rig.reason(), Reason::outside_set) << to_string(rig.reason());
 }

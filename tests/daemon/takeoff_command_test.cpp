@@ -53,7 +53,7 @@ struct LiftsItself : Lockstep {
     ASSERT_GT(ticks_until(Mode::tracking, 250), 0) << to_string(reason());
     offer(rise(), true, true);
     ASSERT_GT(ticks_until(Mode::lifting, 3), 0) << to_string(reason());
-    setpoints_before_lift = view().setpoints;
+    setpoints_before_lift = view().shown.setpoints_sent;
     armed = true;
     asked_within(60);  // until it says that it is armed
   }
@@ -130,7 +130,7 @@ TEST(TakeoffCommand, ALineThatTakesNothingWhileTheAutopilotLiftsIsQuiet) {
   }
   EXPECT_EQ(rig.mode(), Mode::quiet);
   EXPECT_EQ(rig.reason(), Reason::transmit_full);
-  EXPECT_EQ(rig.view().setpoints, rig.setpoints_before_lift) << "there were none";
+  EXPECT_EQ(rig.view().shown.setpoints_sent, rig.setpoints_before_lift) << "there were none";
   EXPECT_LE(blocked, 11) << "200 ms";
 }
 

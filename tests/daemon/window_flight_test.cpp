@@ -118,7 +118,7 @@ class WindowFlight : public testing::Test {
     EXPECT_EQ(rig_.mode(), Mode::tracking) << to_string(rig_.reason());
     EXPECT_LT((rig_.view().command.p_W - goal).norm(), 0.05) << rig_.view().command.p_W.transpose();
     EXPECT_GT(nearest_, 0);
-    EXPECT_EQ(rig_.view().outside, 0u);
+    EXPECT_EQ(rig_.view().shown.samples_outside, 0u);
   }
   map::Cell at(const Vec3& p) const {
     const Index3 v = world_->grid.index(p);
@@ -195,7 +195,7 @@ TEST_F(WindowFlight, WithoutItsMapperAFlightEndsInWhatIsKnownAndNoneBeginsBeyond
   EXPECT_LT(rig_.view().command.p_W.x(), -0.8) << "beyond it nothing was said";
   EXPECT_EQ(rig_.mode(), Mode::tracking);
   EXPECT_GT(nearest_, 0);
-  EXPECT_EQ(rig_.view().outside, 0u);
+  EXPECT_EQ(rig_.view().shown.samples_outside, 0u);
   EXPECT_EQ(go({-2, 0, 1.2}), "") << "back is known";
   expect_at({-2, 0, 1.2});
 }

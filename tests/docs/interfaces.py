@@ -98,11 +98,12 @@ def names_of_json(text: str) -> set[str]:
 
 
 def names_of_status(root: pathlib.Path) -> set[str]:
-    """Keys of the status: in json_of itself, and in the lists of members that it goes through."""
-    folder = root / "services/backwashctl"
-    code = (folder / "status_output.cpp").read_text()
-    lists = code + (folder / "station.hpp").read_text()
-    return names_of_json(code.split("json_of(")[1]) | set(re.findall(r'\{"(\w+)",\s*&dds::Status::', lists))
+    """Keys of the status: the list that every output goes through, and the parameters. It has each member of the IDL."""
+    idl = re.search(r"struct Status_ \{(.*?)\};", re.sub(r"//[^\n]*", "", (root / "idl/backwash_msgs.idl").read_text()), re.S)[1]
+    listed = re.findall(r'StatusMember\{"(\w+)",\s*&Status::(\w+)', (root / "services/dds/status_members.hpp").read_text())
+    expect("members of the status", {member for _, member in listed} | {"stamp", "session", "sequence_number", "parameters", "advice"},
+           set(re.findall(r"(\w+);", idl)))
+    return {key for key, _ in listed} | {"parameters"}
 
 
 def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> None:

@@ -44,7 +44,7 @@ MAY = {
     "firmware_bridge": ["core/types"],
     "services/parallel": [],
     "services/command_line": [],
-    "services/security": [],
+    "services/security": ["idl"],
     "services/dds": ["idl", "services/security"],
     "services/maps": ["core/types", "core/files", "core/map", "core/log"],
     # What flies sees neither the simulation nor what judges flights afterwards.

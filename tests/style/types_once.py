@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A type has its name alone in its namespace: two of one name in two files are one type to the linker, whatever each file says.
 Looked at are the classes and enumerations that core, firmware_bridge and services define in namespaces with a name. What is
-defined as Outer::Inner belongs to one of several implementations, of which a build takes one (GpioLine).
+defined as Outer::Inner belongs to one of several implementations, of which a build takes one.
 
 types_once.py SOURCE_DIR
 """

@@ -14,22 +14,9 @@
 #include <thread>
 #include <vector>
 
-#include "backwash_msgs.h"
+#include "type_hashes.hpp"
 
 namespace {
-
-const dds_topic_descriptor_t* const kTypes[] = {&backwash_msgs_msg_dds__Status__desc,
-                                                &backwash_msgs_msg_dds__Ack__desc,
-                                                &backwash_msgs_msg_dds__Command__desc,
-                                                &backwash_msgs_msg_dds__ReachTube__desc,
-                                                &nav_msgs_msg_dds__Odometry__desc,
-                                                &nav_msgs_msg_dds__Path__desc,
-                                                &octomap_msgs_msg_dds__Octomap__desc,
-                                                &sensor_msgs_msg_dds__BatteryState__desc,
-                                                &sensor_msgs_msg_dds__PointCloud2__desc,
-                                                &tf2_msgs_msg_dds__TFMessage__desc,
-                                                &visualization_msgs_msg_dds__MarkerArray__desc,
-                                                &diagnostic_msgs_msg_dds__DiagnosticArray__desc};
 
 struct Asked {
   std::string topic, qos;
@@ -75,9 +62,9 @@ int main(int argc, char** argv) {
   const dds_entity_t publications = dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr);
   std::vector<Asked> all;
   for (int n = 3; n < argc; n += 3) {
-    const auto* const* type =
-        std::ranges::find_if(kTypes, [&](const auto* t) { return std::string(t->m_typename) == argv[n + 1]; });
-    if (type == std::end(kTypes)) return 64;
+    const auto* const* type = std::ranges::find_if(
+        backwash::dds::kDescriptors, [&](const auto* t) { return std::string(t->m_typename) == argv[n + 1]; });
+    if (type == std::end(backwash::dds::kDescriptors)) return 64;
     const dds_entity_t topic = dds_create_topic(participant, *type, argv[n], nullptr, nullptr);
     all.push_back({argv[n], argv[n + 2], make_reader(participant, topic, argv[n + 2])});
   }

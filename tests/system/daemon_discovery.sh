@@ -16,35 +16,32 @@ unset CYCLONEDDS_URI FASTRTPS_DEFAULT_PROFILES_FILE
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 
-topic() { echo "rt/backwash/$1 $2"; }
+# Each topic out that is sent reliably, by each quality that it serves.
 asked=()
-for qos in sensor default; do
-  asked+=($(topic status backwash_msgs::msg::dds_::Status_) $qos $(topic ack backwash_msgs::msg::dds_::Ack_) $qos)
-done
-for qos in sensor default latched; do
-  asked+=(rt/diagnostics diagnostic_msgs::msg::dds_::DiagnosticArray_ $qos)
-  asked+=($(topic tube backwash_msgs::msg::dds_::ReachTube_) $qos $(topic trajectory nav_msgs::msg::dds_::Path_) $qos)
-  asked+=($(topic markers visualization_msgs::msg::dds_::MarkerArray_) $qos)
-  asked+=($(topic battery sensor_msgs::msg::dds_::BatteryState_) $qos)
-  asked+=($(topic disturbance sensor_msgs::msg::dds_::PointCloud2_) $qos)
-done
+while read -r topic type way most; do
+  [[ $way == out && $most != sensor ]] || continue
+  for qos in sensor default latched; do
+    asked+=("$topic" "$type" "$qos")
+    [[ $qos != "$most" ]] || break
+  done
+done < <("$source_dir/tests/support/topics.py" "$source_dir" | sed 's|^|rt/backwash/|'
+  echo rt/diagnostics diagnostic_msgs::msg::dds_::DiagnosticArray_ out latched)
 # seen WHERE: by both as they come, all that was asked. The status comes 10 times a second.
 seen() {
   local reader
   for reader in fastdds cyclone; do
     "$build/tests/${reader}_reader" "$domain" 8 "${asked[@]}" >"$work/seen" 2>>"$log" || die "no $reader reader"
-    python3 - "$work/seen" "$source_dir" "$1, $reader" <<'PYTHON' || die "$1, $reader: $(<"$work/seen")"
+    python3 - "$work/seen" "$source_dir" "$1, $reader" "${asked[@]}" <<'PYTHON' || die "$1, $reader: $(<"$work/seen")"
 import pathlib, re, sys
 sys.dont_write_bytecode = True
 sys.path.insert(0, sys.argv[2] + "/idl")
 import type_hashes as t
 types = t.types_of(pathlib.Path(sys.argv[2], "idl/ros2.idl").read_text())
 types |= t.types_of(pathlib.Path(sys.argv[2], "idl/backwash_msgs.idl").read_text())
-of = {"status": "backwash_msgs/msg/Status", "ack": "backwash_msgs/msg/Ack", "tube": "backwash_msgs/msg/ReachTube",
-      "trajectory": "nav_msgs/msg/Path", "markers": "visualization_msgs/msg/MarkerArray",
-      "disturbance": "sensor_msgs/msg/PointCloud2", "battery": "sensor_msgs/msg/BatteryState", "diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
+asked = sys.argv[4:]
+of = {name.rsplit("/", 1)[1]: re.sub(r"(\w+)::msg::dds_::(\w+)_", r"\1/msg/\2", type_) for name, type_ in zip(asked[::3], asked[1::3])}
 lines = [re.fullmatch(r"rt/(?:backwash/)?(\w+) (\w+): matched (\d+), (\d+) samples, user data (.*)", l.rstrip()) for l in open(sys.argv[1])]
-assert len(lines) == 22 and all(lines), lines
+assert len(lines) == len(asked) // 3 and all(lines), lines
 for topic, qos, matched, samples, said in (l.groups() for l in lines):
     assert matched == "1", (topic, qos, matched)
     assert said == f"typehash=RIHS01_{t.hash_of(of[topic], types)};", (topic, said)

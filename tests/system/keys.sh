@@ -28,9 +28,14 @@ for who in drone eyes pilot guest; do
   grep -qF "<subject_name>${subject#subject=}</subject_name>" $who.permissions || die "$who: $subject is not who the permissions are for"
 done
 [[ $(openssl x509 -in net/eyes/cert.pem -noout -enddate) == "notAfter=Jun  1 00:00:00 2030 GMT" ]] || die "--until was not kept"
-may() { sed -n '/<publish>/,/<\/publish>/p' "$1.permissions" | grep -o '<topic>[^<]*' | sed 's/<topic>//' | xargs; }
-[[ $(may drone) == "rt/fleet/one/ack rt/fleet/one/status rt/fleet/one/tube rt/fleet/one/trajectory rt/fleet/one/markers rt/fleet/one/disturbance rt/fleet/one/map_receipt rt/fleet/one/battery rt/diagnostics rt/tf" ]] || die "drone may write $(may drone)"
-[[ $(may eyes) == "rt/backwash/odometry rt/backwash/loop_closure rt/backwash/map rt/backwash/points rt/backwash/map_part rt/vins/odometry rt/tf" ]] || die "eyes may write $(may eyes)"
+may() { sed -n '/<publish>/,/<\/publish>/p' "$1.permissions" | grep -o '<topic>[^<]*' | sed 's/<topic>//' | sort | xargs; }
+# topics WAY NAMESPACE TOPIC …: those of docs/interfaces.md that go there, but for the station's, and the others
+topics() {
+  { "$here/../support/topics.py" "$here/../.." | awk -v way="$1" -v at="rt/$2/" '$3 == way && $1 != "command" {print at $1}'
+    printf '%s\n' "${@:3}"; } | sort | xargs
+}
+[[ $(may drone) == "$(topics out fleet/one rt/diagnostics rt/tf)" ]] || die "drone may write $(may drone)"
+[[ $(may eyes) == "$(topics in backwash rt/vins/odometry rt/tf)" ]] || die "eyes may write $(may eyes)"
 [[ $(may pilot) == "rt/backwash/command rt/backwash/map_part" && -z $(may guest) ]] || die "pilot may write $(may pilot), guest $(may guest)"
 [[ $(find net -type f -name key.pem -not -perm 0600 -o -type d -not -perm 0700) == "" ]] || die "others may read what is secret: $(ls -lR net)"
 [[ $(find net -name key.pem | wc -l) == 5 ]] || die "not five keys"

@@ -51,7 +51,7 @@ void Feed::take_status() {
   const auto now = Clock::now();
   // What another daemon, or this one before a gap, has counted is no beginning of a rate.
   if (!lately_.empty() &&
-      (now - lately_.back().first > kWatch || newest->numbers.ticks < lately_.back().second.numbers.ticks))
+      (now - lately_.back().first > kWatch || newest->said.ticks < lately_.back().second.said.ticks))
     lately_.clear();
   lately_.emplace_back(now, *newest);
   while (lately_.size() > 2 && now - lately_[1].first >= kWatch) lately_.pop_front();

@@ -15,13 +15,11 @@ function power(battery) {
   return [`${share}, ${voltage}`, `${battery.age_s.toFixed(1)} s`]
 }
 
-export function rows({ status, age_s, battery }) {
+// What the daemon says by name, and what is made of several members.
+export function rows({ status, age_s, battery, rows: named }) {
   const [said, said_age] = power(battery)
-  const us = (t) => `${t.p50.toFixed(0)} / ${t.p99.toFixed(0)} / ${t.max.toFixed(0)} µs`
-  const seconds = (v) => (v === null ? 'none yet' : v < 0 ? 'none' : `${v.toFixed(2)} s`)
-  const all = {
-    'position, m': status.position.map((v) => v.toFixed(2)).join(', '),
-    'set-point, m': status.setpoint.map((v) => v.toFixed(2)).join(', '),
+  return {
+    ...Object.fromEntries(named),
     armed: status.armed ? 'armed' : 'disarmed',
     autopilot: `${status.autopilot}, ${status.offboard ? 'follows us' : 'does not follow us'}`,
     flight: status.landed ? 'on the ground' : status.moving ? 'moving' : 'at rest',
@@ -29,16 +27,7 @@ export function rows({ status, age_s, battery }) {
     'age of battery': said_age,
     'inside its sets': `${status.samples_inside} of ${status.samples_inside + status.samples_outside}`,
     'age of status': `${age_s.toFixed(1)} s`,
-    'age of odometry': seconds(status.odometry_age_s),
-    'age of map': seconds(status.map_age_s),
-    'tick, p50 / p99 / max': us(status.tick_us),
-    'wake-up late': us(status.lateness_us),
-    'odometry to wire': us(status.odometry_to_wire_us),
-    'periods missed': String(status.ticks_missed),
-    'stop switch': status.stop_switch,
   }
-  if (status.air) all.air = status.air
-  return all
 }
 
 export function fill(list, all) {

@@ -46,6 +46,7 @@ class PageEvents {
     const Seen seen = feed_.seen();
     Json event = control_.told(page_);
     event["status"] = seen.status ? json_of(*seen.status) : Json();
+    event["rows"] = seen.status ? Json(rows_of(*seen.status)) : Json::array();
     event["age_s"] = seen.status ? Json(std::chrono::duration<double>(Clock::now() - seen.status_at).count()) : Json();
     event["now_s"] = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
     event["battery"] = battery(seen);
@@ -68,7 +69,7 @@ class PageEvents {
   static Json battery(const Seen& seen) {
     if (!seen.status || !seen.battery) return {};
     const auto& [stamp_ns, share, voltage] = *seen.battery;
-    const double before_s = 1e-9 * static_cast<double>(dds::nanoseconds(seen.status->numbers.stamp) - stamp_ns);
+    const double before_s = 1e-9 * static_cast<double>(dds::nanoseconds(seen.status->said.stamp) - stamp_ns);
     const double since_s = std::chrono::duration<double>(Clock::now() - seen.status_at).count();
     return {{"share", share ? Json(*share) : Json()},
             {"voltage_v", voltage ? Json(*voltage) : Json()},
@@ -77,7 +78,7 @@ class PageEvents {
 
   static Json over_bound(const Seen& seen) {
     if (!seen.status || !seen.path) return {};
-    const auto &p = seen.status->numbers.position, &c = seen.status->numbers.setpoint;
+    const auto &p = seen.status->said.position, &c = seen.status->said.setpoint;
     const auto over = error_over_bound(*seen.path, {p.x, p.y, p.z}, {c.x, c.y, c.z});
     return over ? Json(*over) : Json();
   }

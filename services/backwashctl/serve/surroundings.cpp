@@ -96,7 +96,7 @@ nlohmann::json Surroundings::planned(const Proposal& proposal) const {
   if (!world_) return refused(failure_.empty() ? "there is no map yet" : failure_);
   if (!seen.status || Clock::now() - seen.status_at > std::chrono::duration<double>(kOld_s))
     return refused("where the vehicle is is not known now");
-  const auto& n = seen.status->numbers;
+  const auto& n = seen.status->said;
   if (n.landed || n.moving) return refused("the way begins where the vehicle rests in the air: hold first");
   Setpoint hover;
   hover.p_W = Vec3(n.setpoint.x, n.setpoint.y, n.setpoint.z);

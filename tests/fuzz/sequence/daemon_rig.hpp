@@ -50,7 +50,7 @@ class DaemonRig {
   /// From now on nothing but an operator disturbs the flight: each step of the set-point is judged, too.
   void operated_only() { watch_.operated_only(daemon::test::vehicle_5in().limits.a_max); }
   /// Ticks in which the vehicle was outside its set.
-  std::uint64_t outside() const { return lock_.view().outside; }
+  std::uint64_t outside() const { return lock_.view().shown.samples_outside; }
   /// Ticks spent in each mode.
   const std::array<long, kModes>& spent() const { return spent_; }
 
