@@ -18,6 +18,8 @@
 #include "core/plan/stop.hpp"
 #include "core/reach/rest.hpp"
 #include "core/track/rebase.hpp"
+#include "core/types/angle.hpp"
+#include "core/types/minimum_jerk.hpp"
 #include "core/types/text.hpp"
 
 namespace backwash::daemon {
@@ -576,7 +578,7 @@ std::optional<std::string> PlannerWorker::rectify() {
     if (!next.clear()) return "the way back is not clear: " + left(*world_, next.segment.clearance);
     add_guards(next, *world_, view_.index);
     spdlog::info("loop closure {}: {:.3f} m and {:.2f} degrees, {} from command {} on", view_.closures,
-                 (D.point(view_.command.p_W) - view_.command.p_W).norm(), D.yaw * 180 / 3.14159265358979,
+                 (D.point(view_.command.p_W) - view_.command.p_W).norm(), D.yaw / kDegree,
                  flying_->held ? "held where it is" : "rectified", branch);
     if (offer(std::move(next))) return std::nullopt;
     refresh();
