@@ -42,7 +42,7 @@ TEST(Loop, IsOneForSimulationSetsAndLogs) {
     answered = std::max(answered, (open[k] - a[k]).norm());
   }
   EXPECT_LT(simulated, 0.001);
-  EXPECT_LT(read, 0.012);  // measured 10.6 mm at up to 1.5 m/s: 7 ms, what pieces of 5 ms are out by
+  EXPECT_LT(read, 0.005);
   EXPECT_GT(undelayed, 2 * read);
   EXPECT_LT(answered, 0.1);
 }
