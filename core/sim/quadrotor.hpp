@@ -7,9 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/loop/position_loop.hpp"
 #include "core/sim/thrust_terms.hpp"
-#include "core/types/angle.hpp"
 #include "core/types/state.hpp"
 #include "core/types/vehicle.hpp"
 
@@ -26,10 +24,10 @@ namespace backwash::sim {
 /// With thrust terms the rotors give something else than f along its direction; what is commanded and logged stays.
 class Quadrotor {
  public:
-  static constexpr double kStep = 1e-3;             ///< s
-  static constexpr double kMinThrust = 0.05;        ///< of max_thrust: the rotors never stop in the air
-  static constexpr double kMaxTilt = 45 * kDegree;  ///< rad
-  static constexpr double kMaxYawRate = 1.0;        ///< rad/s
+  static constexpr double kStep = 1e-3;                       ///< s
+  static constexpr double kMinThrust = 0.05;                  ///< of max_thrust: the rotors never stop in the air
+  static constexpr double kMaxTilt = 0.78539816339744830962;  ///< 45°, rad
+  static constexpr double kMaxYawRate = 1.0;                  ///< rad/s
 
   /// Hovering at `start`, motors on, the set-point there. `z_floor`: height of the vehicle's centre when it stands on
   /// the ground, m: it never sinks below, and stands still there while its thrust does not lift it.
@@ -62,7 +60,6 @@ class Quadrotor {
   Vec3 given(const Vec3& produced);
 
   Vehicle vehicle_;
-  loop::PositionLoop loop_;
   State state_;
   std::optional<double> z_floor_;
   bool motors_on_ = true, on_ground_ = false;

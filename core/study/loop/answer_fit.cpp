@@ -43,17 +43,15 @@ Vehicle with(Vehicle vehicle, const VectorXd& theta, bool level, double late) {
   return vehicle;
 }
 
-std::vector<Vec3> answer_of(const AnswerLog& log, const Vehicle& vehicle, double forward) {
-  auto commands = log.commands;
-  for (auto& c : commands) c.a_W *= forward;
-  Flown flown = log.flown();
-  flown.commands = commands;
-  const auto loop = with_command_age(loop::PositionLoop(vehicle), flown.t);
-  return answers(flown, loop, std::array{loop.attitude_lag}).front();
-}
-
-std::vector<Vec3> positions_of(const AnswerLog& log, const Vehicle& vehicle) {
-  return loop_of(log.flown(), with_command_age(loop::PositionLoop(vehicle), log.series.t)).p;
+/// A set-point acts a quarter of a period late on the mean of logs that are held and ones that are streamed, as
+/// loop_of() has it.
+std::vector<Vec3> answer_of(const AnswerLog& log, Vehicle vehicle, double forward) {
+  const Series& s = log.series;
+  Commands commands = log.commands;
+  for (auto& a : commands.a) a *= forward;
+  vehicle.controller.latency += kWindowRules.command_age * s.t.back() / static_cast<double>(s.size() - 1);
+  const std::array<double, 1> lag{vehicle.controller.attitude_lag};
+  return answers(s, commands, vehicle, lag).front();
 }
 
 /// slow(…, detrended(x), width) of a window as a matrix: it is asked for thousands of times.
@@ -211,7 +209,7 @@ Answers fit_level(std::span<const AnswerLog> logs, const Vehicle& start, bool by
     };
   } else {
     of.modelled = [&start, late](const AnswerLog& log, const VectorXd& t) {
-      return positions_of(log, with(start, t, true, late));
+      return loop_of(log.series, log.commands, with(start, t, true, late), true).p;
     };
     of.measured = [](const Series& s, std::size_t i) { return s.p[i]; };
   }
@@ -237,7 +235,7 @@ Answers fit_vertical(std::span<const AnswerLog> logs, const Vehicle& start, bool
     of.measured = [](const Series& s, std::size_t i) { return s.a_sim[i]; };
   } else {
     of.modelled = [&start, late](const AnswerLog& log, const VectorXd& t) {
-      return positions_of(log, with(start, t, false, late));
+      return loop_of(log.series, log.commands, with(start, t, false, late), true).p;
     };
     of.measured = [](const Series& s, std::size_t i) { return s.p[i]; };
   }

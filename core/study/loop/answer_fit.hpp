@@ -13,8 +13,7 @@ namespace backwash::study {
 /// A log as the fit reads it: its samples, set-points, and windows that are good.
 struct AnswerLog {
   Series series;
-  std::vector<Setpoint> commands;
-  Flown flown() const { return {series.t, series.p, series.v, commands}; }
+  Commands commands;
   std::vector<SampleRange> windows;
 };
 
