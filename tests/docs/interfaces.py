@@ -81,9 +81,10 @@ def printed(root: pathlib.Path, build: pathlib.Path) -> dict[str, str]:
         verbs += f"- `{verb}`{' `--wait`' if told.pop('return when it is done', '') else ''}: {what}\n"
         of_verbs += listed({m: cell.replace("`", f"`{verb} ", 1) for m, cell in told.items()})
     blocks["backwashctl"] = f"{listed(options(help_of(path)))}\nVerbs; `--wait` returns when it is done:\n\n{verbs}\nOptions of one verb:\n\n{of_verbs}"
-    may = (root / "services/security/documents.cpp").read_text().split("switch (grant.role)")[1].split("topics.insert(topics.end(), grant")[0]
-    blocks["roles"] = "".join(f"- `{role}` may write " + (", ".join(re.findall('"([a-z_/]+)"', body)) or "nothing") + "\n"
-                              for role, body in re.findall(r"case Role::(\w+):(.*?)break;", may, re.S))
+    declared = topics_of(root)
+    more = {"vehicle": ["rt/diagnostics", "rt/tf"]}  # of all robots of a domain
+    blocks["roles"] = "".join(f"- `{role}` may write " + (", ".join([n for n, _, _, may in declared if role in may] + more.get(role, [])) or "nothing") + "\n"
+                              for role in ("vehicle", "station", "vio", "observer"))
     blocks["DDS"] = topics(root)
     return blocks
 
@@ -184,19 +185,23 @@ DELIVERY = {"latest": "best effort, keep last 1", "scans": "best effort, keep la
             "state": "reliable, transient local, keep last 1"}
 
 
+def topics_of(root: pathlib.Path) -> list[tuple[str, str, str, list[str]]]:
+    """Name, type, delivery and the roles that may write it, of each topic of idl/topics.hpp."""
+    types = re.findall(r'Typed<(\w+)_desc, topic_named\("(\w+)"\)>', (root / "services/dds/topics.hpp").read_text())
+    type_of = {name: type_.replace("_msg_dds__", "::msg::dds_::") for type_, name in types}
+    code = (root / "idl/topics.hpp").read_text()
+    return [(name, type_of[name], DELIVERY[delivery], re.findall(r"vehicle|station|vio", may.lower()))
+            for name, delivery, may in re.findall(r'\{"(\w+)", Delivery::(\w+), (.+)\},', code)]
+
+
 def topics(root: pathlib.Path) -> str:
     """The topics by their declarations; what is in one stands behind it in the page."""
-    code = (root / "services/dds/topics.hpp").read_text()
-    ours = re.search(r"case Role::vehicle:(.*?)break;", (root / "services/security/documents.cpp").read_text(), re.S)[1]
     said = {c[0].rsplit("/", 1)[1]: c[4] for c in rows(sections((root / "docs/interfaces.md").read_text())["DDS"]) if c[0].startswith("rt/NAMESPACE")}
     out = "| topic | type | direction | delivery | frame and content |\n| --- | --- | --- | --- | --- |\n"
-    for type_, name, delivery in re.findall(
-            r"return (\w+)_desc; \}\s*static constexpr const char\* kName = \"(\w+)\";\s*"
-            r"static constexpr Delivery kDelivery = Delivery::(\w+);", code):
-        way = "out" if f'"{name}"' in ours else "in"
+    for name, type_, delivery, may in topics_of(root):
         if not said.get(name):
             wrong.append(f"DDS: what is in {name}?")
-        out += f"| rt/NAMESPACE/{name} | {type_.replace('_msg_dds__', '::msg::dds_::')} | {way} | {DELIVERY[delivery]} | {said.get(name, '')} |\n"
+        out += f"| rt/NAMESPACE/{name} | {type_} | {'out' if 'vehicle' in may else 'in'} | {delivery} | {said.get(name, '')} |\n"
     return out
 
 
