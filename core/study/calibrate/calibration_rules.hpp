@@ -47,7 +47,8 @@ struct CalibrationRules {
   // Variance by height
   Rule least_height{"least_height", 0.005, "m", "derived: as clear: nearer, feet may touch"};
   Rule fewest_height_rows{"fewest_height_rows", 10, "windows", "chosen: the regression has 6 columns"};
-  Rule low_height{"low_height", 0.01, "m", "derived: the lowest height of the recordings (docs/measurements/recordings.md)"};
+  Rule low_height{"low_height", 0.01, "m",
+                  "derived: the lowest height of the recordings (docs/measurements/recordings.md)"};
   Rule high_height{"high_height", 0.8, "m", "derived: the highest height of the recordings"};
   Rule height_length{"height_length", 0.05, "m",
                      "chosen: where half of the wash returns, two rotor radii of the recorded craft"};

@@ -54,7 +54,8 @@ const char* to_string(RotorVerdict::Kind kind);
 /// is what tells them apart. Thresholds come from the sound flights alone (their scatter per contrast, for a further
 /// flight), so that a judged condition never took part in setting them; the flights of a group count as one, since
 /// what moves the contrasts between sessions is common to them. The sound flights count as independent: where they are
-/// of few sessions, false alarms are more (docs/measurements/recordings.md). `minimum`: noncentral t by a normal, δ = t + z₀.₈ √(1
+/// of few sessions, false alarms are more (docs/measurements/recordings.md). `minimum`: noncentral t by a normal, δ = t
+/// + z₀.₈ √(1
 /// + t²/2n) of both tests. Nothing with fewer than 4 sound flights or an empty group.
 std::optional<RotorVerdict> judge_rotors(const std::vector<RotorContrasts>& sound,
                                          const std::vector<RotorContrasts>& group);

@@ -20,7 +20,7 @@ struct Known {
 
 struct CauseSearchOptions {
   int flips = static_cast<int>(kRules.flips);  ///< sign draws of the null
-  double accept_p = kRules.accept_p;           ///< family-wise, nominal; docs/measurements/confusion.md says what it comes to
+  double accept_p = kRules.accept_p;  ///< family-wise, nominal; docs/measurements/confusion.md says what it comes to
   unsigned seed = 1;
   std::size_t most_causes = static_cast<std::size_t>(kRules.most_causes);
   std::vector<Known> known = {};  ///< what is left may be the error of their forms, as beside an accepted cause
