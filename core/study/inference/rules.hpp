@@ -146,7 +146,7 @@ struct Rules {
   Rule told_quantile{"told_quantile", 0.95, "1", "chosen: of the hover sets, told beside the median"};
   Rule plan_deadline{
       "plan_deadline", 3, "s",
-      "measured: twelve times what 95 % of backwash compare's plans take, 247 ms (research/compare/README.md)"};
+      "measured: twelve times what 95 % of backwash compare's plans take, 247 ms (docs/measurements/compare.md)"};
   Rule least_route{"least_route", 0.3, "m", "chosen: between places that are nearer no plan is told"};
   Rule fewest_compared{"fewest_compared", 8, "windows", "chosen: in which a channel is simulated beside measured"};
   Rule picture_groups{"picture_groups", 12, "groups", "chosen: of windows, whose means a picture draws"};
