@@ -95,6 +95,7 @@ BLOCK = re.compile(r"(<!-- printed: (.*?) -->\n)(.*?)(<!-- end -->)", re.S)
 # --- JSON and exit codes ---------------------------------------------------------------------------------------------
 
 def names_of_json(text: str) -> set[str]:
+    text = re.sub(r"one_of\(\{.*?\}\)", "", text)  # values of an option
     return set(re.findall(r'\{"([A-Za-z]\w*)",(?! *&)', text)) | set(re.findall(r'(?<=[\w\]])\["([A-Za-z]\w*)"\]', text))
 
 

@@ -100,7 +100,7 @@ struct Rules {
   // Rotors against sound flights
   Rule rotor_level{"rotor_level", 0.05, "1", "chosen: over the four rotors"};
   Rule rotor_of_interest{"rotor_of_interest", 0.06, "of one rotor's thrust",
-                         "derived: the size of core/study/confusion.md"};
+                         "derived: the size of docs/measurements/confusion.md"};
   Rule normal_80{"normal_80", normal::k80, "1", "derived: quantile of the normal distribution at `power`"};
   Rule fewest_sound{"fewest_sound", 4, "flights", "derived: three contrasts and a scatter"};
   // Causes in some flights only
