@@ -41,7 +41,7 @@ tl::expected<RawLog, LogError> raw_log_of(const std::string& path, const std::st
   const std::span bytes(reinterpret_cast<const std::uint8_t*>(content.data()), content.size());
   if (is_mcap(bytes)) return raw_log_of_mcap(path, bytes);
   const std::string_view mcap(reinterpret_cast<const char*>(kMcapMagic.data()), kMcapMagic.size());
-  if (kMagic.starts_with(content) || mcap.starts_with(content)) return RawLog{{}, 0};
+  if (content != kMagic && (kMagic.starts_with(content) || mcap.starts_with(content))) return RawLog{{}, 0};
   if (!content.starts_with(kMagic))
     return tl::unexpected(
         LogError{LogError::Kind::bad_data, path + ": byte 0: does not begin as a raw log: as MCAP, or as before"});
