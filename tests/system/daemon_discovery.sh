@@ -99,7 +99,7 @@ print(f"index 0 twice, then 100, then none: {said.strip()}")
 PYTHON
 
 # A reader that is stopped, and asks for every sample: the others get theirs.
-"$build/tests/fastdds_reader" "$domain" 60 $(topic status backwash_msgs::msg::dds_::Status_) default >/dev/null 2>&1 &
+"$build/tests/fastdds_reader" "$domain" 60 rt/backwash/status backwash_msgs::msg::dds_::Status_ default >/dev/null 2>&1 &
 stopped=$!
 more_pids+=("$stopped")
 sleep 2
