@@ -114,7 +114,7 @@ spoof=(python3 "$source_dir/tests/system/spoofed_packets.py" "$domain" "$writer"
 [[ $(status odometry_refused) == 0 ]] || die "odometry was refused before"
 there "${spoof[@]}"
 [[ $(status odometry_refused) == 0 ]] || die "what another machine sent was heard"
-there "$build/tests/fastdds_reader" "$domain" 4 $(topic status backwash_msgs::msg::dds_::Status_) sensor >"$work/far" 2>>"$log"
+there "$build/tests/fastdds_reader" "$domain" 4 rt/backwash/status backwash_msgs::msg::dds_::Status_ sensor >"$work/far" 2>>"$log"
 grep -q 'matched 0, 0 samples' "$work/far" || die "another machine reads the status: $(<"$work/far")"
 "${spoof[@]}"
 sleep 1
