@@ -72,7 +72,7 @@ assert {**peer, "chunks": 0} == {**json.load(open("exported.json")), "chunks": 0
 old = open("old.bwlog", "rb").read()[len(raw_log.MAGIC):]
 assert peer["raw"] == hashlib.sha256(old).hexdigest() and counts["/backwash/raw_log"] == len(records)
 begun = list(raw_log.records("cut.bwlog"))
-assert len(records) / 4 < len(begun) == cut["counts"]["/backwash/raw_log"] < len(records)
+assert len(records) / 4 < len(begun) == cut["counts"]["/backwash/raw_log"] < len(records), (len(records), len(begun), cut["counts"]["/backwash/raw_log"])
 assert cut["raw"] == hashlib.sha256(old[:sum(16 + len(body) for _, _, body in begun)]).hexdigest()
 # PlotJuggler's layout finds every topic that it plots (its members: ros2_bringup).
 curves = [curve.get("name") for curve in ElementTree.parse(sys.argv[2]).iter("curve")]
