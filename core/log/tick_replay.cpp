@@ -238,6 +238,8 @@ tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name
     const track::AcceptedSegment* segment = nullptr;
     if (input->segment != 0) {
       const auto found = segments->find(input->segment);
+      // Offers come by another ring than ticks, so of a log that is cut short the last ones may lie beyond the cut.
+      if (found == segments->end() && log.cut_at) break;
       if (found == segments->end())
         return bad(at(name, record) + "offers segment " + std::to_string(input->segment) + ", which is not in the log");
       segment = found->second.get();

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # The log of a flight of the real processes, as the daemon wrote it, against independent readers of MCAP and of ROS 2's messages from the
-# npm registry (tests/log/peer): what its topics say is what its records, read by other code, and the CSV say. Cut short as by a kill it is
+# npm registry (tests/log/peer): what its topics say is what its records, read by other code, and the CSV say. As a kill would leave it, it is
 # read to its last whole record by them and by us. `backwash export` of it, and of the same records in the format of before, is the same
 # file to all; replay, report, adapt and study take each. Then `backwash merge` with a ULog of what the emulated PX4 said.
 #   mcap_peer.sh SOURCE_DIR BUILD_DIR
@@ -13,7 +13,12 @@ out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 backwash=$build/services/backwash
 before=$(date +%s)
-"$source_dir/services/bench/flight.sh" "$build" "$out" flight builtin:apartment 3.0,4.2,1.2 7.4,3.0,1.2 builtin:quad-5in 1 px4 >/dev/null || { cat "$out/flight.log"; exit 1; }
+"$source_dir/services/bench/flight.sh" "$build" "$out" flight builtin:apartment 3.0,4.2,1.2 7.4,3.0,1.2 builtin:quad-5in 1 px4 >/dev/null &
+flying=$!
+# What a kill would leave: the file as it lies there in the middle of the flight.
+while kill -0 $flying && [[ $(stat -c %s "$out/flight.bwlog" 2>/dev/null || echo 0) -lt 3000000 ]]; do sleep 0.1; done
+cp "$out/flight.bwlog" "$out/cut.bwlog"
+wait $flying || { cat "$out/flight.log"; exit 1; }
 cd "$out"
 export PYTHONPATH=$source_dir/tests/system
 python3 - <<'PYTHON'
@@ -29,7 +34,7 @@ PYTHON
 cmp flight.mcap old.mcap || { echo 'in the format of before it is another log'; exit 1; }
 node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" flight.bwlog >peer.json
 node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" flight.mcap >exported.json
-head -c $(($(stat -c %s flight.bwlog) / 2)) flight.bwlog >cut.bwlog
+truncate -s -5 cut.bwlog
 node "$source_dir/tests/log/peer/read_mcap.cjs" "$modules" cut.bwlog cut >cut.json
 "$backwash" replay --log cut.bwlog --json | grep -q '"equal": *true'
 
@@ -72,7 +77,8 @@ assert {**peer, "chunks": 0} == {**json.load(open("exported.json")), "chunks": 0
 old = open("old.bwlog", "rb").read()[len(raw_log.MAGIC):]
 assert peer["raw"] == hashlib.sha256(old).hexdigest() and counts["/backwash/raw_log"] == len(records)
 begun = list(raw_log.records("cut.bwlog"))
-assert len(records) / 4 < len(begun) == cut["counts"]["/backwash/raw_log"] < len(records), (len(records), len(begun), cut["counts"]["/backwash/raw_log"])
+read = cut["counts"]["/backwash/raw_log"]
+assert len(records) / 4 < len(begun) == read < len(records), (len(records), len(begun), read)
 assert cut["raw"] == hashlib.sha256(old[:sum(16 + len(body) for _, _, body in begun)]).hexdigest()
 # PlotJuggler's layout finds every topic that it plots (its members: ros2_bringup).
 curves = [curve.get("name") for curve in ElementTree.parse(sys.argv[2]).iter("curve")]
