@@ -12,12 +12,12 @@
 #include "firmware_bridge/line_loss.hpp"
 #include "firmware_bridge/mavlink/signing.hpp"
 #include "firmware_bridge/outgoing.hpp"
-#include "firmware_bridge/plain_port.hpp"
-#include "firmware_bridge/serial_port.hpp"
-#include "firmware_bridge/tcp_port.hpp"
+#include "firmware_bridge/port/plain_port.hpp"
+#include "firmware_bridge/port/serial_port.hpp"
+#include "firmware_bridge/port/tcp_port.hpp"
+#include "firmware_bridge/port/transmit_queue.hpp"
+#include "firmware_bridge/port/udp_port.hpp"
 #include "firmware_bridge/telemetry.hpp"
-#include "firmware_bridge/transmit_queue.hpp"
-#include "firmware_bridge/udp_port.hpp"
 
 namespace backwash::firmware_bridge {
 

@@ -7,7 +7,7 @@
 #include <memory>
 #include <optional>
 
-#include "core/reach/coloured_error.hpp"
+#include "core/reach/response/coloured_error.hpp"
 #include "core/types/air_class.hpp"
 
 namespace backwash::adapt {

@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "core/field/element_buckets.hpp"
 #include "core/field/extension.hpp"
+#include "core/field/lateral/element_buckets.hpp"
 #include "core/field/proximity_model.hpp"
-#include "core/field/sight.hpp"
+#include "core/field/sight/sight.hpp"
 #include "core/field/whole_field.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/voxel_box.hpp"

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/field/around.hpp"
+#include "core/field/sight/around.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/voxel_box.hpp"
 #include "core/types/model.hpp"

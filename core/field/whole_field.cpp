@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/field/block_sweep.hpp"
-#include "core/field/sight_path.hpp"
+#include "core/field/lateral/block_sweep.hpp"
+#include "core/field/sight/sight_path.hpp"
 
 namespace backwash::field {
 

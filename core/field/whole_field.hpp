@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/field/lateral_columns.hpp"
+#include "core/field/lateral/lateral_columns.hpp"
 #include "core/field/proximity_model.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/types/model.hpp"

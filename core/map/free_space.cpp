@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "core/map/scan.hpp"
+#include "core/map/scan/scan.hpp"
 
 namespace backwash::map {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/map/octomap_tree.hpp"
+#include "core/map/octomap/octomap_tree.hpp"
 
 namespace backwash::map {
 namespace {

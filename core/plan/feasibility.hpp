@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 
 namespace backwash::plan {
 

@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "core/plan/ends.hpp"
-#include "core/plan/refinement.hpp"
 #include "core/plan/rest.hpp"
+#include "core/plan/search/ends.hpp"
+#include "core/plan/spline/refinement.hpp"
 #include "core/reach/clearance.hpp"
 #include "core/types/text.hpp"
 

@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
-#include "core/plan/bspline.hpp"
-#include "core/plan/bspline_optimizer.hpp"
-#include "core/plan/world.hpp"
-#include "core/plan/yaw.hpp"
+#include "core/plan/spline/bspline.hpp"
+#include "core/plan/spline/bspline_optimizer.hpp"
+#include "core/plan/spline/yaw.hpp"
+#include "core/plan/world/world.hpp"
 #include "core/reach/risk.hpp"
 
 namespace backwash::plan {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/plan/ends.hpp"
 #include "core/plan/rest.hpp"
+#include "core/plan/search/ends.hpp"
 #include "core/plan/stop.hpp"
 
 namespace backwash::plan {

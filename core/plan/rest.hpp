@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 
 namespace backwash::plan {
 

@@ -2,7 +2,7 @@
 // Take-off and landing: the vertical corridor below the lowest clear hover height (docs/model.md section 4).
 #include <algorithm>
 
-#include "core/plan/ends.hpp"
+#include "core/plan/search/ends.hpp"
 
 namespace backwash::plan {
 

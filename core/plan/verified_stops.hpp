@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 
 namespace backwash::plan {
 

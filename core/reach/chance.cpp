@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/reach/response_builder.hpp"
+#include "core/reach/response/response_builder.hpp"
 
 namespace backwash::reach {
 namespace {

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "core/reach/coloured_error.hpp"
 #include "core/reach/reach_tube.hpp"
+#include "core/reach/response/coloured_error.hpp"
 #include "core/types/disturbance.hpp"
 
 // Chance-constrained sets (docs/model.md section 5.3): no worst case, but a stated probability of leaving them. In

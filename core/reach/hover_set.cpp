@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "core/reach/block_extents.hpp"
+#include "core/reach/bound/block_extents.hpp"
 #include "core/reach/clearance.hpp"
 #include "core/reach/ellipsoid.hpp"
 #include "core/reach/rest.hpp"

@@ -7,7 +7,7 @@
 #include "core/map/distance_field.hpp"
 #include "core/map/occupancy_sums.hpp"
 #include "core/map/voxel_box.hpp"
-#include "core/reach/bound_field.hpp"
+#include "core/reach/bound/bound_field.hpp"
 #include "core/reach/reach_tube.hpp"
 
 namespace backwash::reach {

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "core/reach/bound_field.hpp"
+#include "core/reach/bound/bound_field.hpp"
 #include "core/reach/ellipsoid.hpp"
-#include "core/reach/error_dynamics.hpp"
-#include "core/reach/integrator.hpp"
+#include "core/reach/response/error_dynamics.hpp"
+#include "core/reach/response/integrator.hpp"
 #include "core/reach/support.hpp"
 #include "core/types/disturbance.hpp"
 #include "core/types/state.hpp"

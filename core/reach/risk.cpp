@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/reach/clearance.hpp"
-#include "core/reach/coloured_error.hpp"
+#include "core/reach/response/coloured_error.hpp"
 #include "core/types/normal.hpp"
 
 namespace backwash::reach {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/reach/error_dynamics.hpp"
+#include "core/reach/response/error_dynamics.hpp"
 #include "core/reach/support_filter.hpp"
 #include "core/types/disturbance.hpp"
 #include "core/types/geometry.hpp"

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "core/plan/world.hpp"
-#include "core/reach/bound_code.hpp"
+#include "core/plan/world/world.hpp"
+#include "core/reach/bound/bound_code.hpp"
 
 namespace backwash::report {
 

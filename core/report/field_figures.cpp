@@ -5,8 +5,8 @@
 #include <sstream>
 
 #include "core/report/field_box.hpp"
-#include "core/report/figure_parts.hpp"
-#include "core/report/figures.hpp"
+#include "core/report/page/figure_parts.hpp"
+#include "core/report/page/figures.hpp"
 
 namespace backwash::report {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "core/plan/world.hpp"
-#include "core/report/page_data.hpp"
+#include "core/plan/world/world.hpp"
+#include "core/report/page/page_data.hpp"
 #include "core/sim/flight.hpp"
 
 namespace backwash::report {

@@ -4,8 +4,8 @@
 #include <limits>
 #include <sstream>
 
-#include "core/report/figure_parts.hpp"
-#include "core/report/figures.hpp"
+#include "core/report/page/figure_parts.hpp"
+#include "core/report/page/figures.hpp"
 
 namespace backwash::report {
 namespace {

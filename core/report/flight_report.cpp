@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "core/report/flight_data.hpp"
-#include "core/report/interactive.hpp"
-#include "core/report/page.hpp"
+#include "core/report/page/interactive.hpp"
+#include "core/report/page/page.hpp"
 #include "core/report/recorded_tables.hpp"
 #include "core/types/text.hpp"
 

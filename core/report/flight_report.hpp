@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/report/figures.hpp"
-#include "core/report/page_data.hpp"
+#include "core/report/page/figures.hpp"
+#include "core/report/page/page_data.hpp"
 
 namespace backwash::report {
 

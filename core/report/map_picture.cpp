@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "core/report/figure_parts.hpp"
+#include "core/report/page/figure_parts.hpp"
 #include "core/types/text.hpp"
 
 namespace backwash::report {

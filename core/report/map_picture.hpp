@@ -5,7 +5,7 @@
 #include <tl/expected.hpp>
 
 #include "core/map/occupancy_grid.hpp"
-#include "core/report/plot.hpp"
+#include "core/report/page/plot.hpp"
 
 namespace backwash::report {
 

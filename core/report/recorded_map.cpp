@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/report/recorded_map.hpp"
 
-#include "core/map/octomap_message.hpp"
+#include "core/map/octomap/octomap_message.hpp"
 
 namespace backwash::report {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "core/log/raw_log.hpp"
+#include "core/log/raw/raw_log.hpp"
 #include "core/map/occupancy_grid.hpp"
 
 namespace backwash::report {

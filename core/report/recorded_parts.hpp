@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/log/flight_log.hpp"
-#include "core/log/raw_log.hpp"
+#include "core/log/columns/flight_log.hpp"
+#include "core/log/raw/raw_log.hpp"
 #include "core/types/state.hpp"
 
 namespace backwash::report {

@@ -7,10 +7,10 @@
 #include <map>
 #include <sstream>
 
-#include "core/log/air_log.hpp"
-#include "core/log/tick_log.hpp"
-#include "core/report/figure_parts.hpp"
-#include "core/report/plot.hpp"
+#include "core/log/raw/air_log.hpp"
+#include "core/log/raw/tick_log.hpp"
+#include "core/report/page/figure_parts.hpp"
+#include "core/report/page/plot.hpp"
 #include "core/report/recorded_map.hpp"
 
 namespace backwash::report {

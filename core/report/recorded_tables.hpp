@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "core/log/raw_log.hpp"
-#include "core/report/page_data.hpp"
+#include "core/log/raw/raw_log.hpp"
+#include "core/report/page/page_data.hpp"
 
 namespace backwash::report {
 

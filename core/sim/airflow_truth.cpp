@@ -5,7 +5,7 @@
 #include <array>
 #include <numbers>
 
-#include "core/sim/ray.hpp"
+#include "core/sim/vehicle/ray.hpp"
 #include "core/types/angle.hpp"
 
 namespace backwash::sim {

@@ -5,9 +5,9 @@
 #include <chrono>
 #include <limits>
 
-#include "core/plan/ends.hpp"
 #include "core/plan/rest.hpp"
-#include "core/reach/integrator.hpp"
+#include "core/plan/search/ends.hpp"
+#include "core/reach/response/integrator.hpp"
 #include "core/types/minimum_jerk.hpp"
 #include "core/types/text.hpp"
 

@@ -9,14 +9,14 @@
 #include <variant>
 #include <vector>
 
-#include "core/log/flight_log.hpp"
+#include "core/log/columns/flight_log.hpp"
 #include "core/plan/planner.hpp"
-#include "core/sim/air_terms.hpp"
 #include "core/sim/airflow_truth.hpp"
 #include "core/sim/model_air.hpp"
-#include "core/sim/quadrotor.hpp"
-#include "core/sim/sensors.hpp"
-#include "core/sim/vio.hpp"
+#include "core/sim/vehicle/air_terms.hpp"
+#include "core/sim/vehicle/quadrotor.hpp"
+#include "core/sim/vehicle/sensors.hpp"
+#include "core/sim/vehicle/vio.hpp"
 #include "core/track/tracker.hpp"
 
 namespace backwash::sim {

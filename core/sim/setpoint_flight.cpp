@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/log/log_columns.hpp"
-#include "core/log/median.hpp"
+#include "core/log/columns/log_columns.hpp"
+#include "core/log/columns/median.hpp"
 #include "core/types/thrust.hpp"
 
 namespace backwash::sim {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <sstream>
 
-#include "core/report/figure_parts.hpp"
+#include "core/report/page/figure_parts.hpp"
 #include "research/compare/compare_report.hpp"
 
 namespace backwash::report {

@@ -3,7 +3,7 @@
 
 #include <sstream>
 
-#include "core/report/page.hpp"
+#include "core/report/page/page.hpp"
 #include "core/types/formatted.hpp"
 
 namespace backwash::report {

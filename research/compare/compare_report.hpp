@@ -7,7 +7,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "core/report/plot.hpp"
+#include "core/report/page/plot.hpp"
 #include "research/compare/compare_statistics.hpp"
 
 namespace backwash::report {

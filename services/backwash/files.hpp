@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/log/flight_log.hpp"
+#include "core/log/columns/flight_log.hpp"
 #include "core/map/occupancy_grid.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "core/reach/reach_tube.hpp"
 #include "core/types/model.hpp"
 #include "core/types/simulation_term.hpp"

@@ -12,7 +12,7 @@
 #include "core/config/file_hash.hpp"
 #include "core/config/map_window.hpp"
 #include "core/map/load_map.hpp"
-#include "core/map/octomap_message.hpp"
+#include "core/map/octomap/octomap_message.hpp"
 #include "services/command_line/exit_code.hpp"
 
 namespace backwash::ctl {

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "core/adapt/in_flight.hpp"
-#include "core/log/raw_log.hpp"
-#include "core/plan/world.hpp"
+#include "core/log/raw/raw_log.hpp"
+#include "core/plan/world/world.hpp"
 #include "core/sync/atomic_optional.hpp"
 #include "core/sync/handover.hpp"
 #include "core/sync/latest_value.hpp"
@@ -24,8 +24,8 @@
 #include "firmware_bridge/autopilot_link.hpp"
 #include "firmware_bridge/gpio/stop_switch.hpp"
 #include "firmware_bridge/parameters.hpp"
-#include "services/backwashd/map_news.hpp"
-#include "services/backwashd/timing.hpp"
+#include "services/backwashd/control/timing.hpp"
+#include "services/backwashd/map/map_news.hpp"
 #include "services/dds/topics.hpp"
 
 /// What the daemon's threads hand to each other. Every member has exactly one writing and one reading thread and is

@@ -10,18 +10,18 @@
 #include <system_error>
 
 #include "core/config/file_hash.hpp"
-#include "services/backwashd/air_file.hpp"
-#include "services/backwashd/control_loop.hpp"
-#include "services/backwashd/dds_front.hpp"
-#include "services/backwashd/gpio_worker.hpp"
-#include "services/backwashd/link_watch.hpp"
-#include "services/backwashd/log_sink.hpp"
-#include "services/backwashd/map_front.hpp"
-#include "services/backwashd/map_worker.hpp"
-#include "services/backwashd/planner_worker.hpp"
+#include "services/backwashd/control/control_loop.hpp"
+#include "services/backwashd/control/link_watch.hpp"
+#include "services/backwashd/in/dds_front.hpp"
+#include "services/backwashd/in/signing_time.hpp"
+#include "services/backwashd/map/map_front.hpp"
+#include "services/backwashd/map/map_worker.hpp"
+#include "services/backwashd/out/gpio_worker.hpp"
+#include "services/backwashd/plan/air_file.hpp"
+#include "services/backwashd/plan/planner_worker.hpp"
 #include "services/backwashd/process.hpp"
+#include "services/backwashd/record/log_sink.hpp"
 #include "services/backwashd/service_manager.hpp"
-#include "services/backwashd/signing_time.hpp"
 #include "services/parallel/real_time.hpp"
 
 namespace backwash::daemon {

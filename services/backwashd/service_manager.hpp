@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "firmware_bridge/port.hpp"
+#include "firmware_bridge/port/port.hpp"
 
 namespace backwash::daemon {
 

@@ -12,9 +12,9 @@
 #include <thread>
 
 #include "core/map/distance_field.hpp"
-#include "core/sim/vio.hpp"
+#include "core/sim/vehicle/vio.hpp"
 #include "services/bench/controller_in_loop.hpp"
-#include "services/bench/firmware.hpp"
+#include "services/bench/emulation/firmware.hpp"
 #include "services/bench/messages.hpp"
 #include "services/bench/pty.hpp"
 #include "services/bench/scans.hpp"

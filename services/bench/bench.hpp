@@ -9,8 +9,8 @@
 #include "core/config/odometry_profile.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/types/vehicle.hpp"
-#include "services/bench/autopilot.hpp"
-#include "services/bench/faults.hpp"
+#include "services/bench/emulation/autopilot.hpp"
+#include "services/bench/emulation/faults.hpp"
 #include "services/bench/transit.hpp"
 
 namespace backwash::bench {

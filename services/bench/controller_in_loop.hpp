@@ -7,9 +7,9 @@
 #include <thread>
 #include <vector>
 
-#include "firmware_bridge/port.hpp"
-#include "services/bench/airframe.hpp"
-#include "services/bench/autopilot.hpp"
+#include "firmware_bridge/port/port.hpp"
+#include "services/bench/emulation/airframe.hpp"
+#include "services/bench/emulation/autopilot.hpp"
 
 namespace backwash::bench {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/bench/messages.hpp"
 
-#include "core/map/octomap_message.hpp"
+#include "core/map/octomap/octomap_message.hpp"
 #include "services/bench/scans.hpp"
 
 namespace backwash::bench {

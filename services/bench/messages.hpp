@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/config/odometry_profile.hpp"
-#include "services/bench/faults.hpp"
+#include "services/bench/emulation/faults.hpp"
 #include "services/dds/topics.hpp"
 
 namespace backwash::bench {

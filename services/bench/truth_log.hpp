@@ -5,7 +5,7 @@
 #include <iomanip>
 #include <string>
 
-#include "services/bench/autopilot.hpp"
+#include "services/bench/emulation/autopilot.hpp"
 #include "services/command_line/exit_code.hpp"
 
 namespace backwash::bench {

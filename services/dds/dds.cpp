@@ -10,10 +10,10 @@
 #include <cstring>
 #include <string_view>
 
-#include "services/dds/loopback.hpp"
+#include "services/dds/guard/loopback.hpp"
+#include "services/dds/guard/secured.hpp"
 #include "services/dds/quality.hpp"
 #include "services/dds/receive.hpp"
-#include "services/dds/secured.hpp"
 
 namespace backwash::dds {
 namespace {

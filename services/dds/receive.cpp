@@ -12,10 +12,10 @@
 #include <random>
 #include <span>
 
-#include "services/dds/fragments.hpp"
-#include "services/dds/loopback.hpp"
-#include "services/dds/packet_filter.hpp"
-#include "services/dds/strangers.hpp"
+#include "services/dds/guard/fragments.hpp"
+#include "services/dds/guard/loopback.hpp"
+#include "services/dds/guard/packet_filter.hpp"
+#include "services/dds/guard/strangers.hpp"
 
 namespace backwash::dds {
 namespace {

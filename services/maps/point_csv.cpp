@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <set>
 
-#include "core/log/flight_log.hpp"
+#include "core/log/columns/flight_log.hpp"
 #include "services/maps/geometry.hpp"
 
 namespace backwash::maps {

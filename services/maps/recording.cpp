@@ -6,8 +6,8 @@
 #include <set>
 #include <utility>
 
-#include "core/log/mcap_reader.hpp"
-#include "core/log/mcap_walk.hpp"
+#include "core/log/mcap/mcap_reader.hpp"
+#include "core/log/mcap/mcap_walk.hpp"
 #include "core/log/octets.hpp"
 #include "services/maps/content.hpp"
 #include "services/maps/frame_tree.hpp"

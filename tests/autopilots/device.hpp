@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "services/backwashd/link_watch.hpp"
+#include "services/backwashd/control/link_watch.hpp"
 #include "tests/autopilots/peer.hpp"
 
 namespace backwash::autopilots {

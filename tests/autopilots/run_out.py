@@ -22,7 +22,7 @@ AT_REST = 0.1  # m/s, for a second
 OVER = 0.05    # m/s, the way that was last commanded
 WITHIN = 12.0  # s
 BLIND = 20.0   # s, where nothing tells the autopilot any more where it is
-# Of a set-point in a tick, as tests/daemon/planner_test.cpp demands it, with the a_max of 1 m/s² of both vehicle files: how far
+# Of a set-point in a tick, as tests/daemon/plan/planner_test.cpp demands it, with the a_max of 1 m/s² of both vehicle files: how far
 # it may be from where the velocities before and after lead; and its velocity's step.
 OFF_WAY, VELOCITY_STEP = 3e-3, 3.5 / 2 * 0.02  # m, m/s
 STOPPED = 3.0  # s from a stop to where its set-point rests: the way to its branch, braking, and the process that sends it

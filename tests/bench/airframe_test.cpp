@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The vehicle that a controller in the loop flies, against closed forms.
-#include "services/bench/airframe.hpp"
+#include "services/bench/emulation/airframe.hpp"
 
 #include <gtest/gtest.h>
 

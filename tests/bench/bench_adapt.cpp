@@ -12,9 +12,9 @@
 
 #include "core/adapt/in_flight.hpp"
 #include "core/config/config.hpp"
-#include "core/log/air_log.hpp"
+#include "core/log/raw/air_log.hpp"
 #include "core/map/load_map.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 
 namespace {
 

@@ -12,7 +12,7 @@
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "core/reach/clearance.hpp"
 #include "core/reach/reach_tube.hpp"
 

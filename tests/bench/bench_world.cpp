@@ -10,7 +10,7 @@
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "services/parallel/parallel.hpp"
 
 namespace {

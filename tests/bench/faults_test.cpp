@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "services/bench/faults.hpp"
+#include "services/bench/emulation/faults.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

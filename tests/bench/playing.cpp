@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "core/config/config.hpp"
-#include "services/bench/firmware.hpp"
+#include "services/bench/emulation/firmware.hpp"
 #include "tests/autopilots/session.hpp"
 
 namespace backwash::autopilots {

@@ -6,7 +6,7 @@
 #include <deque>
 
 #include "firmware_bridge/outgoing.hpp"
-#include "firmware_bridge/transmit_queue.hpp"
+#include "firmware_bridge/port/transmit_queue.hpp"
 #include "tests/bridge/emulated_controller.hpp"
 
 namespace backwash::firmware_bridge::test {

@@ -11,8 +11,8 @@
 #include <chrono>
 #include <thread>
 
-#include "firmware_bridge/serial_port.hpp"
-#include "firmware_bridge/udp_port.hpp"
+#include "firmware_bridge/port/serial_port.hpp"
+#include "firmware_bridge/port/udp_port.hpp"
 #include "tests/bridge/port_bytes.hpp"
 
 namespace backwash::firmware_bridge::test {

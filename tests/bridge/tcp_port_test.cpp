@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "firmware_bridge/tcp_port.hpp"
+#include "firmware_bridge/port/tcp_port.hpp"
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>

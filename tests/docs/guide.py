@@ -12,7 +12,7 @@ import sys
 
 from page import expect, quoted, rows, sections, wrong
 
-MISSION = ("services/backwashd/mission.cpp", "services/backwashd/mission.cpp")
+MISSION = ("services/backwashd/plan/mission.cpp", "services/backwashd/plan/mission.cpp")
 LITERAL = r'"((?:[^"\\\n]|\\.)*)"'
 
 

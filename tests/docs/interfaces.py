@@ -151,7 +151,7 @@ def check_exit_codes(root: pathlib.Path, sections_of: dict[str, str]) -> None:
 
 def check_columns(root: pathlib.Path, sections_of: dict[str, str]) -> None:
     """Columns of the flight log. Of a series the first one is documented: x for x, y and z, 1 for 1 to 4."""
-    code = (root / "core/log/column_units.cpp").read_text().split("kinds() {")[1].split("return all;")[0]
+    code = (root / "core/log/columns/column_units.cpp").read_text().split("kinds() {")[1].split("return all;")[0]
     actual = set(re.findall(r'"(\w+)"', code))
     shown = {q for c in rows(sections_of["Flight log, CSV"])[1:] for q in quoted(c[0])}
     in_words = set(re.findall(r"\w+", " ".join(quoted(sections_of["Column map"]))))  # what only a foreign table has
@@ -162,7 +162,7 @@ def check_columns(root: pathlib.Path, sections_of: dict[str, str]) -> None:
     wrong.extend(f"Flight log, CSV: not documented: {c}" for c in sorted(actual) if not {c, first(c)} & (shown | in_words))
     wrong.extend(f"Flight log, CSV: does not exist: {c}" for c in sorted(shown - actual))
     if len(actual) < 30:
-        wrong.append(f"Flight log, CSV: only {len(actual)} columns were found in core/log/column_units.cpp")
+        wrong.append(f"Flight log, CSV: only {len(actual)} columns were found in core/log/columns/column_units.cpp")
 
 
 def check_tables(root: pathlib.Path, text: str) -> None:
@@ -272,7 +272,7 @@ def main() -> int:
             wrong.append(f"{file.name} is not what the source says; mend by: tests/docs/interfaces.py {root} {build} --update")
     text = page.read_text()
     sections_of = sections(text)
-    spec = re.search(r'only\(path, file, \{([^}]*)\}', (root / "services/backwash/flight_spec.cpp").read_text())[1]
+    spec = re.search(r'only\(path, file, \{([^}]*)\}', (root / "services/backwash/fly/flight_spec.cpp").read_text())[1]
     expect("Flight specification", {quoted(c[0])[0] for c in rows(sections_of["Flight specification"])[1:]}, set(re.findall(r'"(\w+)"', spec)))
     check_json(root, text, sections_of)
     check_exit_codes(root, sections_of)

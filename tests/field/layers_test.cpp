@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/field/layers.hpp"
+#include "core/field/lateral/layers.hpp"
 
 #include <gtest/gtest.h>
 

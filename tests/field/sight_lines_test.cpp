@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/field/sight_lines.hpp"
+#include "core/field/sight/sight_lines.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <random>
 #include <vector>
 
-#include "core/field/lateral_kernels.hpp"
-#include "core/field/sight.hpp"
+#include "core/field/lateral/lateral_kernels.hpp"
+#include "core/field/sight/sight.hpp"
 
 namespace backwash::field {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "core/field/sight.hpp"
+#include "core/field/sight/sight.hpp"
 #include "tests/field/brute_force.hpp"
 #include "tests/field/scenes.hpp"
 #include "tests/support/line_of_sight.hpp"

@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/log/dataflash.hpp"
-#include "core/log/tick_log.hpp"
-#include "core/log/ulog.hpp"
+#include "core/log/autopilot/dataflash.hpp"
+#include "core/log/autopilot/ulog.hpp"
+#include "core/log/raw/tick_log.hpp"
 #include "core/report/recorded_map.hpp"
-#include "tests/daemon/lockstep.hpp"
+#include "tests/daemon/lockstep/lockstep.hpp"
 #include "tests/fuzz/mutator.hpp"
 
 namespace backwash::fuzz {

@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/map/octomap_message.hpp"
-#include "services/backwashd/cloud.hpp"
+#include "core/map/octomap/octomap_message.hpp"
+#include "services/backwashd/map/cloud.hpp"
 #include "tests/fuzz/mutator.hpp"
 #include "tests/support/write_octomap.hpp"
 

@@ -163,7 +163,7 @@ def cases_of(folder: pathlib.Path) -> dict:
 
 def records(log: bytes):
     """A raw log's records as lines, without what the machine measured: the microseconds and page faults of a tick, and the
-    time at which the loop was made (core/log/raw_log.hpp)."""
+    time at which the loop was made (core/log/raw/raw_log.hpp)."""
     at = len(RAW_LOG) + log[len(RAW_LOG):].index(b"\n") + 1
     while at < len(log):
         t_ns, kind, size = struct.unpack_from("<qII", log, at)

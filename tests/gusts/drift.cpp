@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "core/log/flight_log.hpp"
+#include "core/log/columns/flight_log.hpp"
 #include "core/track/odometry_gate.hpp"
 #include "services/command_line/command_line.hpp"
 #include "tests/gusts/flown_loop.hpp"

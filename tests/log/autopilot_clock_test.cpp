@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Clocks that are known to the test, exchanges with delays on both ways.
-#include "core/log/autopilot_clock.hpp"
+#include "core/log/autopilot/autopilot_clock.hpp"
 
 #include <gtest/gtest.h>
 

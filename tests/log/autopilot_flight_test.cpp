@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/log/autopilot_flight.hpp"
+#include "core/log/autopilot/autopilot_flight.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/log/tick_log.hpp"
+#include "core/log/raw/tick_log.hpp"
 
 namespace backwash::log {
 namespace {

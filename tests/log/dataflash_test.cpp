@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // ArduPilot's logs: a cut of a real one, with what its simulator knew, and what a card may hold.
-#include "core/log/dataflash.hpp"
+#include "core/log/autopilot/dataflash.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/log/flight_log.hpp"
+#include "core/log/columns/flight_log.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

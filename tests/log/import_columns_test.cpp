@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Tables of others by a column map: units, frames, rates, and what physics says of them.
-#include "core/log/import_columns.hpp"
+#include "core/log/columns/import_columns.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -12,7 +12,7 @@
 #include <functional>
 #include <numbers>
 
-#include "core/log/same_flight.hpp"
+#include "core/log/autopilot/same_flight.hpp"
 #include "core/types/geometry.hpp"
 
 namespace backwash::log {

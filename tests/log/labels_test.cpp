@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a table beside the recordings says of them.
-#include "core/log/labels.hpp"
+#include "core/log/columns/labels.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

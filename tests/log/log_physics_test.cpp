@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "core/log/import_columns.hpp"
+#include "core/log/columns/import_columns.hpp"
 #include "core/types/geometry.hpp"
 
 namespace backwash::log {

@@ -10,10 +10,10 @@
 #include <random>
 #include <sstream>
 
-#include "core/log/mcap_flight.hpp"
-#include "core/log/mcap_writer.hpp"
-#include "core/log/raw_flight.hpp"
-#include "core/log/raw_log.hpp"
+#include "core/log/mcap/mcap_flight.hpp"
+#include "core/log/mcap/mcap_writer.hpp"
+#include "core/log/raw/raw_flight.hpp"
+#include "core/log/raw/raw_log.hpp"
 
 namespace backwash::log {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/log/same_flight.hpp"
+#include "core/log/autopilot/same_flight.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <map>
 #include <random>
 
-#include "core/log/import_columns.hpp"
-#include "core/log/ulog.hpp"
+#include "core/log/autopilot/ulog.hpp"
+#include "core/log/columns/import_columns.hpp"
 
 namespace {
 

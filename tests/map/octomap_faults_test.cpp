@@ -6,7 +6,7 @@
 #include <bit>
 #include <limits>
 
-#include "core/map/octomap_message.hpp"
+#include "core/map/octomap/octomap_message.hpp"
 
 namespace backwash::map {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Oracle: liboctomap itself, with which messages are exchanged in both directions.
-#include "core/map/octomap_message.hpp"
+#include "core/map/octomap/octomap_message.hpp"
 
 #include <fstream>
 #include <limits>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/map/regrid.hpp"
+#include "core/map/scan/regrid.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "core/map/lattice_box.hpp"
-#include "core/map/octomap_file.hpp"
+#include "core/map/octomap/octomap_file.hpp"
 #include "tests/map/liboctomap.hpp"
 
 namespace backwash::map {

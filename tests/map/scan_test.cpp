@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/map/scan.hpp"
+#include "core/map/scan/scan.hpp"
 
 #include <gtest/gtest.h>
 

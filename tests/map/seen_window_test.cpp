@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/map/seen_window.hpp"
+#include "core/map/scan/seen_window.hpp"
 
 #include <gtest/gtest.h>
 #include <malloc.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/map/voxelise.hpp"
+#include "core/map/scan/voxelise.hpp"
 
 #include <gtest/gtest.h>
 

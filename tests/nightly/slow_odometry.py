@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The table of slow_odometry.sh: slow_odometry.py OUT_DIR. Sets are read from the raw logs' offers (core/log/tick_replay.cpp)."""
+"""The table of slow_odometry.sh: slow_odometry.py OUT_DIR. Sets are read from the raw logs' offers (core/log/raw/tick_replay.cpp)."""
 import json
 import pathlib
 import struct

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/plan/air_scale.hpp"
+#include "core/plan/world/air_scale.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "core/reach/clearance.hpp"
 #include "tests/support/stored_field.hpp"
 

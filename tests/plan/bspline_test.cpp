@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "core/plan/bspline.hpp"
+#include "core/plan/spline/bspline.hpp"
 #include "tests/plan/drawn.hpp"
 
 namespace backwash::plan {

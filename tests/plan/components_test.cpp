@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/plan/components.hpp"
+#include "core/plan/search/components.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/plan/ends.hpp"
+#include "core/plan/search/ends.hpp"
 
 #include <gtest/gtest.h>
 

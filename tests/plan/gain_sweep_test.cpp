@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
-#include "core/plan/gain_sweep.hpp"
+#include "core/plan/world/gain_sweep.hpp"
 
 namespace backwash::plan {
 namespace {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "core/config/config.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 
 namespace backwash::plan {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "core/plan/kinodynamic_astar.hpp"
+#include "core/plan/search/kinodynamic_astar.hpp"
 
 namespace backwash::plan {
 namespace {

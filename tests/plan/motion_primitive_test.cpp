@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <random>
 
-#include "core/plan/motion_primitive.hpp"
+#include "core/plan/search/motion_primitive.hpp"
 #include "tests/plan/drawn.hpp"
 
 namespace backwash::plan {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/plan/refinement.hpp"
+#include "core/plan/spline/refinement.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
-#include "core/plan/kinodynamic_astar.hpp"
-#include "core/plan/safe_space.hpp"
+#include "core/plan/search/kinodynamic_astar.hpp"
+#include "core/plan/world/safe_space.hpp"
 
 namespace backwash::plan {
 namespace {

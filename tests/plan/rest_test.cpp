@@ -8,7 +8,7 @@
 #include <random>
 
 #include "core/config/config.hpp"
-#include "core/plan/ends.hpp"
+#include "core/plan/search/ends.hpp"
 #include "core/plan/stop.hpp"
 #include "core/plan/verified_stops.hpp"
 #include "core/reach/rest.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/plan/shortcuts.hpp"
+#include "core/plan/search/shortcuts.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include "core/config/config.hpp"
 #include "core/map/distance_field.hpp"
 #include "core/map/load_map.hpp"
-#include "core/plan/kinodynamic_astar.hpp"
-#include "core/plan/way.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/search/kinodynamic_astar.hpp"
+#include "core/plan/search/way.hpp"
+#include "core/plan/world/world.hpp"
 #include "tests/support/regions.hpp"
 
 namespace backwash::plan {

@@ -3,8 +3,8 @@
 
 #include <random>
 
-#include "core/plan/bspline_optimizer.hpp"
 #include "core/plan/planner.hpp"
+#include "core/plan/spline/bspline_optimizer.hpp"
 #include "tests/plan/drawn.hpp"
 
 namespace backwash::plan {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/config/config.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 
 namespace backwash::plan {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 
 #include <gtest/gtest.h>
 

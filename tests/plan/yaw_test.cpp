@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/plan/yaw.hpp"
+#include "core/plan/spline/yaw.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "core/reach/bound_code.hpp"
+#include "core/reach/bound/bound_code.hpp"
 #include "tests/field/brute_force.hpp"
 
 namespace backwash::promises {

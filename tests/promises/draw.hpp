@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "tests/promises/motion.hpp"
 
 namespace backwash::promises {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/plan/ends.hpp"
 #include "core/plan/planner.hpp"
+#include "core/plan/search/ends.hpp"
 #include "core/plan/verified_stops.hpp"
 #include "core/reach/clearance.hpp"
 #include "tests/promises/flyers.hpp"

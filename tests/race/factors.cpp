@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "core/plan/rest.hpp"
-#include "core/reach/coloured_error.hpp"
+#include "core/reach/response/coloured_error.hpp"
 #include "services/parallel/parallel.hpp"
 #include "tests/race/flown.hpp"
 #include "tests/race/race.hpp"

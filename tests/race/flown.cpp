@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/sim/quadrotor.hpp"
+#include "core/sim/vehicle/quadrotor.hpp"
 
 namespace backwash::race {
 

@@ -9,7 +9,7 @@
 
 #include "core/map/distance_field.hpp"
 #include "core/sim/airflow_truth.hpp"
-#include "core/sim/vio.hpp"
+#include "core/sim/vehicle/vio.hpp"
 #include "core/types/state.hpp"
 #include "core/types/vehicle.hpp"
 

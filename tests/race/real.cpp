@@ -8,10 +8,10 @@
 #include <filesystem>
 #include <limits>
 
-#include "core/log/flight_log.hpp"
-#include "core/log/import_airgarage.hpp"
-#include "core/log/import_crazypad.hpp"
-#include "core/reach/coloured_error.hpp"
+#include "core/log/columns/flight_log.hpp"
+#include "core/log/columns/import_airgarage.hpp"
+#include "core/log/columns/import_crazypad.hpp"
+#include "core/reach/response/coloured_error.hpp"
 #include "tests/race/race.hpp"
 
 namespace backwash::race {

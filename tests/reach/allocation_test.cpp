@@ -5,7 +5,7 @@
 #include <new>
 
 #include "core/field/disturbance_field.hpp"
-#include "core/reach/bound_field.hpp"
+#include "core/reach/bound/bound_field.hpp"
 #include "core/reach/clearance.hpp"
 #include "core/reach/ellipsoid.hpp"
 #include "core/reach/support.hpp"

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/reach/error_dynamics.hpp"
+#include "core/reach/response/error_dynamics.hpp"
 
 namespace backwash::reach {
 

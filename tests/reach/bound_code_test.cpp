@@ -12,7 +12,7 @@
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 #include "core/plan/planner.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "tests/support/rounded_up.hpp"
 #include "tests/support/stored_field.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/reach/bound_field.hpp"
+#include "core/reach/bound/bound_field.hpp"
 
 #include <gtest/gtest.h>
 

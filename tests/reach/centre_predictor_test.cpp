@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "core/reach/error_dynamics.hpp"
+#include "core/reach/response/error_dynamics.hpp"
 #include "tests/reach/axis_rollouts.hpp"
 
 namespace backwash::reach {

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/reach/bound_field.hpp"
-#include "core/reach/integrator.hpp"
+#include "core/reach/bound/bound_field.hpp"
+#include "core/reach/response/integrator.hpp"
 
 /// A loop with an integrator, integrated without the code under test, and air to fly in.
 namespace backwash::reach {

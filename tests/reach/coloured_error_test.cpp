@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/reach/coloured_error.hpp"
+#include "core/reach/response/coloured_error.hpp"
 
 #include <gtest/gtest.h>
 

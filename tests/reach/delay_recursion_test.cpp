@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/reach/delay_recursion.hpp"
+#include "core/reach/response/delay_recursion.hpp"
 
 #include <gtest/gtest.h>
 

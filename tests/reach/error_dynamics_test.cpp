@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/reach/error_dynamics.hpp"
+#include "core/reach/response/error_dynamics.hpp"
 
 #include <gtest/gtest.h>
 

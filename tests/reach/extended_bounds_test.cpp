@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "core/reach/bound_field.hpp"
+#include "core/reach/bound/bound_field.hpp"
 #include "tests/support/rounded_up.hpp"
 
 namespace backwash::reach {

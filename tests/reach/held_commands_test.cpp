@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/reach/integrator.hpp"
+#include "core/reach/response/integrator.hpp"
 
 namespace backwash::reach {
 namespace {

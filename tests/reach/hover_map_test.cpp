@@ -9,8 +9,8 @@
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
-#include "core/plan/world.hpp"
-#include "core/reach/block_extents.hpp"
+#include "core/plan/world/world.hpp"
+#include "core/reach/bound/block_extents.hpp"
 
 namespace backwash::reach {
 namespace {

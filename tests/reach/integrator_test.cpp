@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What an integrator of the velocity loop holds: its kernel, the bound on the disturbance less what is held, and sets
 // under it, against an integration of the loop that shares nothing with them.
-#include "core/reach/integrator.hpp"
+#include "core/reach/response/integrator.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <string>
 
-#include "core/reach/error_dynamics.hpp"
+#include "core/reach/response/error_dynamics.hpp"
 #include "tests/support/linear_support.hpp"
 
 namespace backwash::reach {

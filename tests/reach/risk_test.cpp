@@ -9,7 +9,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "core/reach/coloured_error.hpp"
+#include "core/reach/response/coloured_error.hpp"
 #include "tests/reach/axis_rollouts.hpp"
 
 namespace backwash::reach {

@@ -6,7 +6,7 @@
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
-#include "core/report/page_data.hpp"
+#include "core/report/page/page_data.hpp"
 
 namespace backwash::report {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/report/figures.hpp"
+#include "core/report/page/figures.hpp"
 
 #include <gtest/gtest.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The template of every page, what its scripts are given, and what they are copied from.
-#include "core/report/page.hpp"
+#include "core/report/page/page.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -11,9 +11,9 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "core/report/interactive.hpp"
-#include "core/report/page_data.hpp"
-#include "core/report/timeline.hpp"
+#include "core/report/page/interactive.hpp"
+#include "core/report/page/page_data.hpp"
+#include "core/report/page/timeline.hpp"
 
 namespace backwash::report {
 namespace {

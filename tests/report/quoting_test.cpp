@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "core/report/page.hpp"
-#include "core/report/plot.hpp"
+#include "core/report/page/page.hpp"
+#include "core/report/page/plot.hpp"
 
 namespace backwash::report {
 namespace {

@@ -11,7 +11,7 @@
 #include "core/field/disturbance_field.hpp"
 #include "core/map/distance_field.hpp"
 #include "core/map/load_map.hpp"
-#include "core/sim/quadrotor.hpp"
+#include "core/sim/vehicle/quadrotor.hpp"
 
 namespace backwash::sim {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "core/config/config.hpp"
 #include "core/plan/planner.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "core/reach/chance.hpp"
-#include "core/sim/quadrotor.hpp"
+#include "core/sim/vehicle/quadrotor.hpp"
 #include "core/types/minimum_jerk.hpp"
 
 namespace backwash {

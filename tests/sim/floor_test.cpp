@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "core/config/config.hpp"
-#include "core/sim/quadrotor.hpp"
+#include "core/sim/vehicle/quadrotor.hpp"
 
 namespace backwash::sim {
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/sim/quadrotor.hpp"
+#include "core/sim/vehicle/quadrotor.hpp"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
 #include "core/config/config.hpp"
-#include "core/reach/error_dynamics.hpp"
+#include "core/reach/response/error_dynamics.hpp"
 #include "tests/sim/five_inch.hpp"
 
 namespace backwash::sim {

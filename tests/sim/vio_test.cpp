@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/sim/vio.hpp"
+#include "core/sim/vehicle/vio.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <random>
 
-#include "core/log/import_airgarage.hpp"
-#include "core/log/labels.hpp"
+#include "core/log/columns/import_airgarage.hpp"
+#include "core/log/columns/labels.hpp"
 #include "core/study/calibrate/height_effect.hpp"
 
 namespace backwash::study::calibrate {

@@ -8,7 +8,7 @@
 #include <random>
 #include <tuple>
 
-#include "core/study/inference/dependence.hpp"
+#include "core/study/inference/levels/dependence.hpp"
 #include "tests/study_worlds/observe.hpp"
 
 namespace {

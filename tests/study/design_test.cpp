@@ -10,7 +10,7 @@
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
-#include "core/plan/ends.hpp"
+#include "core/plan/search/ends.hpp"
 #include "core/study/design/imagined.hpp"
 #include "core/study/design/ways.hpp"
 #include "core/study/effects/table.hpp"

@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "core/config/config.hpp"
-#include "core/log/import_crazypad.hpp"
+#include "core/log/columns/import_crazypad.hpp"
 #include "core/map/load_map.hpp"
 #include "core/study/findings/consequence.hpp"
 #include "core/study/findings/extend.hpp"

@@ -10,8 +10,8 @@
 #include <map>
 #include <random>
 
-#include "core/log/import_crazypad.hpp"
-#include "core/study/inference/rotor_reference.hpp"
+#include "core/log/columns/import_crazypad.hpp"
+#include "core/study/inference/rotors/rotor_reference.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Rotors that differ as craft are built, heavy weights and damaged propellers (rates: study_shares --weights).
-#include "core/study/inference/sound_rotors.hpp"
+#include "core/study/inference/rotors/sound_rotors.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/inference/two_levels.hpp"
+#include "core/study/inference/levels/two_levels.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <random>
 
 #include "core/study/inference/rules.hpp"
-#include "core/study/windows/distributions.hpp"
+#include "core/study/windows/signals/distributions.hpp"
 
 namespace backwash::study {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "core/study/inference/dependence.hpp"
+#include "core/study/inference/levels/dependence.hpp"
 #include "tests/study_worlds/observe.hpp"
 
 namespace study_worlds {

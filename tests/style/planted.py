@@ -14,11 +14,11 @@ import tempfile
 LAYERING, MODEL, GLOSSARY = "tests/layering/includes.py", "tests/docs/model.py", "tests/docs/glossary.py"
 CITATIONS, TYPES = "tests/docs/citations.py", "tests/style/types_once.py"
 TRACK = "core/track/orders.cpp"  # of a folder that may include neither core/log nor the daemon
-LOG = '"core/log/raw_log.hpp"'
+LOG = '"core/log/raw/raw_log.hpp"'
 # checker, file, what is put at its end (or in place of what stands before the arrow), what is said; "" where it shall pass
 PLANTED = [
     (LAYERING, TRACK, f"#include {LOG}\n", "core/track may not include core/log"),
-    (LAYERING, TRACK, "#include <core/log/raw_log.hpp>\n", "core/track may not include core/log"),
+    (LAYERING, TRACK, "#include <core/log/raw/raw_log.hpp>\n", "core/track may not include core/log"),
     (LAYERING, TRACK, f"/* why */ #include {LOG}\n", "core/track may not include core/log"),
     (LAYERING, TRACK, f"#include /* why */ {LOG}\n", "core/track may not include core/log"),
     (LAYERING, TRACK, f"#incl\\\nude {LOG}\n", "core/track may not include core/log"),
@@ -30,7 +30,7 @@ PLANTED = [
     (LAYERING, TRACK, "import core.log;\n", "modules"),
     (LAYERING, TRACK, f"// #include {LOG}\n", ""),
     (LAYERING, TRACK, f"/*\n#include {LOG}\n*/\n", ""),
-    (LAYERING, TRACK, 'const char* kText = R"(\n#include "core/log/raw_log.hpp"\n)";\n', ""),
+    (LAYERING, TRACK, 'const char* kText = R"(\n#include "core/log/raw/raw_log.hpp"\n)";\n', ""),
     (LAYERING, TRACK, '#include "core/types/state.hpp"\n', ""),
     (MODEL, "docs/model.md", "→ `core/track/orders.cpp:next`, `core/track/orders.cpp:no_such_thing()`\n", "not only `path:symbol`"),
     (MODEL, "docs/model.md", "→ `core/track/orders.cpp:no_such_thing`\n", "core/track/orders.cpp has no no_such_thing"),

@@ -6,7 +6,7 @@
 
 #include "core/plan/feasibility.hpp"
 #include "core/reach/clearance.hpp"
-#include "core/reach/integrator.hpp"
+#include "core/reach/response/integrator.hpp"
 
 namespace backwash::test {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "core/field/sight.hpp"
+#include "core/field/sight/sight.hpp"
 
 namespace backwash::field {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/field/disturbance_field.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 
 namespace backwash::test {
 

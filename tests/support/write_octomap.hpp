@@ -4,7 +4,7 @@
 #include <fstream>
 #include <string>
 
-#include "core/map/octomap_file.hpp"
+#include "core/map/octomap/octomap_file.hpp"
 
 namespace backwash::map {
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads a raw log of backwashd (core/log/raw_log.hpp) and the bench's record of the wire, for the system tests."""
+"""Reads a raw log of backwashd (core/log/raw/raw_log.hpp) and the bench's record of the wire, for the system tests."""
 import collections
 import csv
 import struct

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes raw logs of flights that were never flown (core/log/raw_log.hpp), for the tests of `backwash report`."""
+"""Writes raw logs of flights that were never flown (core/log/raw/raw_log.hpp), for the tests of `backwash report`."""
 import struct
 
 MODES = {"passive": 0, "enabling": 1, "tracking": 2, "hold": 3, "land": 4, "quiet": 5, "lifting": 6}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/track/frame_alignment.hpp"
-#include "tests/track/frames.hpp"
+#include "tests/track/flown/frames.hpp"
 
 #include <gtest/gtest.h>
 

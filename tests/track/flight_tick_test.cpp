@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Obstacles in the sets ahead: the tick brakes, freezes, or goes on around them.
-#include "tests/track/straight_flight.hpp"
+#include "tests/track/flown/straight_flight.hpp"
 
 namespace backwash::track::test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The lift-off: what it sends, when it is over, and that whatever ends it lands.
-#include "tests/track/flown.hpp"
+#include "tests/track/flown/flown.hpp"
 
 namespace backwash::track::test {
 namespace {

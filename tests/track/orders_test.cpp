@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/track/supervisor.hpp"
-#include "tests/track/healthy.hpp"
+#include "tests/track/flown/healthy.hpp"
 
 namespace backwash::track {
 namespace {

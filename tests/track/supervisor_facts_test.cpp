@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "core/track/supervisor.hpp"
-#include "tests/track/healthy.hpp"
+#include "tests/track/flown/healthy.hpp"
 
 namespace backwash::track {
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "core/types/geometry.hpp"
-#include "tests/track/healthy.hpp"
+#include "tests/track/flown/healthy.hpp"
 
 namespace backwash::track {
 namespace {

@@ -2,8 +2,8 @@
 // Events that fall together: an order in the tick of a fault, a switch pressed where the vehicle already holds, poses
 // that are told again, a pilot who takes over before we have, loop closures in a row.
 #include "core/types/angle.hpp"
-#include "tests/track/flown.hpp"
-#include "tests/track/straight_flight.hpp"
+#include "tests/track/flown/flown.hpp"
+#include "tests/track/flown/straight_flight.hpp"
 
 namespace backwash::track::test {
 namespace {

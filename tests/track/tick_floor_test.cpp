@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the tick makes of the ground: the autopilot's word of it, and the floor on which the vehicle stood disarmed.
-#include "tests/track/flown.hpp"
+#include "tests/track/flown/flown.hpp"
 
 namespace backwash::track::test {
 namespace {

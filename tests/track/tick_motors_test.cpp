@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // When the tick accepts a segment, and when motors start or stop for it.
-#include "tests/track/flown.hpp"
+#include "tests/track/flown/flown.hpp"
 
 namespace backwash::track::test {
 namespace {

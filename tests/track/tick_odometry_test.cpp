@@ -3,7 +3,7 @@
 // turned and moved against the map.
 #include <numbers>
 
-#include "tests/track/flown.hpp"
+#include "tests/track/flown/flown.hpp"
 
 namespace backwash::track::test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Which plans and orders a tick takes, what it arms and disarms, and what it gives back.
-#include "tests/track/straight_flight.hpp"
+#include "tests/track/flown/straight_flight.hpp"
 
 namespace backwash::track::test {
 namespace {

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "core/track/tracker.hpp"
-#include "tests/track/first_set.hpp"
+#include "tests/track/flown/first_set.hpp"
 
 namespace backwash::track {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "tests/support/allocations.hpp"
-#include "tests/track/first_set.hpp"
+#include "tests/track/flown/first_set.hpp"
 
 namespace backwash::track {
 namespace {

@@ -2,7 +2,7 @@
 // Of odometry at 20 Hz and more without a stated latency nothing is dated back (docs/model.md 4-13).
 #include <gtest/gtest.h>
 
-#include "tests/track/flown.hpp"
+#include "tests/track/flown/flown.hpp"
 
 namespace backwash::track::test {
 namespace {

@@ -2,7 +2,7 @@
 const field = data.field && decodedField(data.field);
 if (field) data.tables.push(Object.assign({id: "field"}, fieldRows(2, field.level)));
 
-// A bound of 16 bits (core/reach/bound_code.hpp), m/s²; null where the vehicle's centre cannot be.
+// A bound of 16 bits (core/reach/bound/bound_code.hpp), m/s²; null where the vehicle's centre cannot be.
 function boundOf(code) {
   if (code === 0) return null;
   return code === 65535 ? Infinity : (1 + (code & 2047) / 2048) * 2 ** ((code >> 11) - 16);

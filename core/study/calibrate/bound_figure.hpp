@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/map/occupancy_grid.hpp"
-#include "core/report/plot.hpp"
+#include "core/report/page/plot.hpp"
 #include "core/study/calibrate/fit.hpp"
 
 namespace backwash::study::calibrate {

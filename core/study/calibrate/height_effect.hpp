@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/log/flight_log.hpp"
+#include "core/log/columns/flight_log.hpp"
 #include "core/study/calibrate/calibrate.hpp"
 #include "core/study/windows/hover_windows.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "core/study/design/design_rules.hpp"
 #include "core/study/design/divergence.hpp"
 #include "core/study/findings/study.hpp"

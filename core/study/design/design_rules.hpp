@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "core/study/windows/rule.hpp"
+#include "core/study/windows/gates/rule.hpp"
 
 namespace backwash::study {
 

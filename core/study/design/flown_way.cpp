@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
-#include "core/plan/ends.hpp"
+#include "core/plan/search/ends.hpp"
 #include "core/study/design/design_rules.hpp"
 #include "core/study/design/ways.hpp"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/plan/planner.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "core/types/waypoint.hpp"
 
 namespace backwash::study {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "core/study/windows/rule.hpp"
+#include "core/study/windows/gates/rule.hpp"
 
 namespace backwash::study {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/plan/planner.hpp"
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "core/study/findings/study.hpp"
 
 namespace backwash::study {

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <sstream>
 
-#include "core/report/page.hpp"
+#include "core/report/page/page.hpp"
 #include "core/study/findings/study.hpp"
 #include "core/study/findings/words.hpp"
 

@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "core/report/plot.hpp"
+#include "core/report/page/plot.hpp"
 #include "core/study/calibrate/height_effect.hpp"
-#include "core/study/inference/rotor_reference.hpp"
+#include "core/study/inference/rotors/rotor_reference.hpp"
 #include "core/study/windows/observation.hpp"
 
 namespace backwash::study {

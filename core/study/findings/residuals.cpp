@@ -6,7 +6,7 @@
 #include <optional>
 #include <sstream>
 
-#include "core/report/page.hpp"
+#include "core/report/page/page.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/inference/rules.hpp"
 

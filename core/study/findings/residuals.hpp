@@ -8,7 +8,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "core/report/plot.hpp"
+#include "core/report/page/plot.hpp"
 #include "core/study/windows/observation.hpp"
 
 /// What a simulation says of measured flights whose set-points it flew, window by window.

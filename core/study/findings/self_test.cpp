@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/report/page.hpp"
+#include "core/report/page/page.hpp"
 #include "core/study/findings/page_sections.hpp"
 
 namespace backwash::study {

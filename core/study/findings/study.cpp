@@ -10,7 +10,7 @@
 #include "core/study/inference/coverage.hpp"
 #include "core/study/inference/estimate.hpp"
 #include "core/study/inference/rivals.hpp"
-#include "core/study/inference/rotor_rules.hpp"
+#include "core/study/inference/rotors/rotor_rules.hpp"
 
 namespace backwash::study {
 namespace {

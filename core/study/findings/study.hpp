@@ -8,8 +8,8 @@
 
 #include "core/study/findings/applied.hpp"
 #include "core/study/findings/shift.hpp"
-#include "core/study/inference/dependence.hpp"
-#include "core/study/inference/sound_rotors.hpp"
+#include "core/study/inference/levels/dependence.hpp"
+#include "core/study/inference/rotors/sound_rotors.hpp"
 #include "core/study/inference/whole_search.hpp"
 
 namespace backwash::study {

@@ -8,7 +8,7 @@
 #include <optional>
 #include <sstream>
 
-#include "core/report/page.hpp"
+#include "core/report/page/page.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/self_test.hpp"
 #include "core/study/findings/where_it_acts.hpp"

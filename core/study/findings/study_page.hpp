@@ -3,11 +3,11 @@
 
 #include <optional>
 
-#include "core/report/plot.hpp"
+#include "core/report/page/plot.hpp"
 #include "core/study/calibrate/height_effect.hpp"
 #include "core/study/findings/consequence.hpp"
 #include "core/study/findings/study.hpp"
-#include "core/study/inference/rotor_reference.hpp"
+#include "core/study/inference/rotors/rotor_reference.hpp"
 
 namespace backwash::study {
 

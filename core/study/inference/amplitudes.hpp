@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "core/study/inference/levels/two_levels.hpp"
 #include "core/study/inference/search.hpp"
-#include "core/study/inference/two_levels.hpp"
 
 /// What each window and each flight says of a form's parameters.
 namespace backwash::study {

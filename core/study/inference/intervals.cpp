@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/study/inference/rules.hpp"
-#include "core/study/windows/distributions.hpp"
+#include "core/study/windows/signals/distributions.hpp"
 #include "core/types/normal.hpp"
 
 namespace backwash::study {

@@ -2,8 +2,8 @@
 #include "core/study/inference/rules.hpp"
 
 #include "core/study/effects/effect_rules.hpp"
-#include "core/study/inference/rotor_rules.hpp"
-#include "core/study/windows/window_rules.hpp"
+#include "core/study/inference/rotors/rotor_rules.hpp"
+#include "core/study/windows/gates/window_rules.hpp"
 
 namespace backwash::study {
 std::vector<Rule> rules() {

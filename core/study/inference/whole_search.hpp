@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "core/study/inference/some_flights.hpp"
+#include "core/study/inference/levels/some_flights.hpp"
 
 namespace backwash::study {
 

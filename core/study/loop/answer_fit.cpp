@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "core/study/windows/instrument.hpp"
+#include "core/study/windows/signals/instrument.hpp"
 
 namespace backwash::study {
 namespace {

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/log/log_columns.hpp"
+#include "core/log/columns/log_columns.hpp"
 #include "core/study/loop/answer_fit.hpp"
-#include "core/study/windows/distributions.hpp"
-#include "core/study/windows/gates.hpp"
+#include "core/study/windows/gates/gates.hpp"
+#include "core/study/windows/signals/distributions.hpp"
 
 namespace backwash::study {
 namespace {

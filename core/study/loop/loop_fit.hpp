@@ -9,7 +9,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "core/log/flight_log.hpp"
+#include "core/log/columns/flight_log.hpp"
 #include "core/types/vehicle.hpp"
 
 /// What flights say of a vehicle's position loop: the keys of its file that an autopilot's log can tell.

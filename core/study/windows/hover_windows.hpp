@@ -8,9 +8,9 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "core/log/flight_log.hpp"
-#include "core/study/windows/gates.hpp"
-#include "core/study/windows/gust_spectrum.hpp"
+#include "core/log/columns/flight_log.hpp"
+#include "core/study/windows/gates/gates.hpp"
+#include "core/study/windows/signals/gust_spectrum.hpp"
 #include "core/types/geometry.hpp"
 #include "core/types/vehicle.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/log/log_columns.hpp"
+#include "core/log/columns/log_columns.hpp"
 #include "core/study/windows/hover_windows.hpp"
 
 namespace backwash::study {

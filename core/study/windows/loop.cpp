@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/log/log_columns.hpp"
-#include "core/study/windows/window_rules.hpp"
+#include "core/log/columns/log_columns.hpp"
+#include "core/study/windows/gates/window_rules.hpp"
 
 namespace backwash::study {
 

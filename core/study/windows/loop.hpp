@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/log/flight_log.hpp"
-#include "core/study/windows/series.hpp"
+#include "core/log/columns/flight_log.hpp"
+#include "core/study/windows/signals/series.hpp"
 #include "core/types/vehicle.hpp"
 
 /// The position loop of a vehicle file, driven by what a log holds.

@@ -6,13 +6,13 @@
 #include <numbers>
 #include <span>
 
-#include "core/study/windows/gates.hpp"
-#include "core/study/windows/instrument.hpp"
-#include "core/study/windows/rotor_channels.hpp"
-#include "core/study/windows/series.hpp"
-#include "core/study/windows/signals.hpp"
+#include "core/study/windows/gates/gates.hpp"
+#include "core/study/windows/signals/instrument.hpp"
+#include "core/study/windows/signals/rotor_channels.hpp"
+#include "core/study/windows/signals/series.hpp"
+#include "core/study/windows/signals/signals.hpp"
+#include "core/study/windows/signals/texture.hpp"
 #include "core/study/windows/stretch.hpp"
-#include "core/study/windows/texture.hpp"
 
 namespace backwash::study {
 namespace {

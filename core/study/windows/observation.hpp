@@ -8,16 +8,16 @@
 #include <string>
 #include <vector>
 
-#include "core/log/flight_log.hpp"
+#include "core/log/columns/flight_log.hpp"
 #include "core/map/occupancy_grid.hpp"
-#include "core/study/windows/gate.hpp"
-#include "core/study/windows/instrument.hpp"
-#include "core/study/windows/rotor_channels.hpp"
-#include "core/study/windows/series.hpp"
+#include "core/study/windows/gates/gate.hpp"
+#include "core/study/windows/gates/window_rules.hpp"
+#include "core/study/windows/signals/instrument.hpp"
+#include "core/study/windows/signals/rotor_channels.hpp"
+#include "core/study/windows/signals/series.hpp"
+#include "core/study/windows/signals/texture.hpp"
 #include "core/study/windows/stretch.hpp"
 #include "core/study/windows/surroundings.hpp"
-#include "core/study/windows/texture.hpp"
-#include "core/study/windows/window_rules.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
 

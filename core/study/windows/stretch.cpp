@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "core/study/windows/gates.hpp"
+#include "core/study/windows/gates/gates.hpp"
 
 namespace backwash::study {
 

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "core/study/windows/series.hpp"
-#include "core/study/windows/window_rules.hpp"
+#include "core/study/windows/gates/window_rules.hpp"
+#include "core/study/windows/signals/series.hpp"
 
 namespace backwash::study {
 

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "core/map/lattice.hpp"
-#include "core/study/windows/window_rules.hpp"
+#include "core/study/windows/gates/window_rules.hpp"
 
 namespace backwash::study {
 

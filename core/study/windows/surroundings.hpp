@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/field/around.hpp"
 #include "core/field/disturbance_field.hpp"
+#include "core/field/sight/around.hpp"
 
 namespace backwash::study {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/map/octomap_message.hpp"
+#include "core/map/octomap/octomap_message.hpp"
 
 namespace backwash::ctl {
 namespace {

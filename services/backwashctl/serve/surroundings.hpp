@@ -9,7 +9,7 @@
 #include <stop_token>
 #include <string>
 
-#include "core/plan/world.hpp"
+#include "core/plan/world/world.hpp"
 #include "services/backwashctl/serve/feed.hpp"
 #include "services/backwashctl/serve/gate.hpp"
 

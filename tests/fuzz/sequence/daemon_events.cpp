@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
-#include "core/map/octomap_message.hpp"
+#include "core/map/octomap/octomap_message.hpp"
 #include "firmware_bridge/mavlink/frames.hpp"
-#include "services/backwashd/scan_placement.hpp"
+#include "services/backwashd/map/scan_placement.hpp"
 #include "tests/fuzz/sequence/daemon_rig.hpp"
 
 namespace backwash::fuzz {
@@ -209,7 +209,7 @@ void DaemonRig::apply_to_map(const Event& e) {
   }
 }
 
-// As services/backwashd/map_front.cpp takes a scan, but for the message around it.
+// As services/backwashd/map/map_front.cpp takes a scan, but for the message around it.
 void DaemonRig::scan_box(const Vec3& at) {
   std::vector<Vec3> points;
   for (int i = -2; i <= 2; ++i)

@@ -7,10 +7,10 @@
 
 #include <filesystem>
 
-#include "core/log/tick_log.hpp"
+#include "core/log/raw/tick_log.hpp"
 #include "core/map/load_map.hpp"
-#include "core/map/octomap_message.hpp"
-#include "services/backwashd/switch_reaction.hpp"
+#include "core/map/octomap/octomap_message.hpp"
+#include "services/backwashd/control/switch_reaction.hpp"
 
 namespace backwash::fuzz {
 namespace {
@@ -178,7 +178,7 @@ void DaemonRig::look() {
   }
 }
 
-// As services/backwashd/run_mission.cpp's thread.
+// As services/backwashd/plan/run_mission.cpp's thread.
 void DaemonRig::run_mission() {
   auto& channels = *lock_.channels;
   daemon::MissionInput in;

@@ -6,13 +6,13 @@
 #include <optional>
 #include <string>
 
-#include "services/backwashd/localization.hpp"
-#include "services/backwashd/map_worker.hpp"
-#include "services/backwashd/mission.hpp"
-#include "services/backwashd/planner_worker.hpp"
-#include "services/backwashd/scan_placement.hpp"
-#include "services/bench/firmware.hpp"
-#include "tests/daemon/lockstep.hpp"
+#include "services/backwashd/in/localization.hpp"
+#include "services/backwashd/map/map_worker.hpp"
+#include "services/backwashd/map/scan_placement.hpp"
+#include "services/backwashd/plan/mission.hpp"
+#include "services/backwashd/plan/planner_worker.hpp"
+#include "services/bench/emulation/firmware.hpp"
+#include "tests/daemon/lockstep/lockstep.hpp"
 #include "tests/fuzz/sequence/event.hpp"
 #include "tests/fuzz/sequence/watch.hpp"
 

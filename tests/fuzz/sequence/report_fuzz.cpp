@@ -67,7 +67,7 @@ std::vector<Event> drawn(std::uint64_t seed, std::mt19937_64& draws) {
   return events;
 }
 
-/// What the ticks in some bytes of a log say (core/log/raw_log.hpp: a head of 16 bytes, the kind at its byte 8).
+/// What the ticks in some bytes of a log say (core/log/raw/raw_log.hpp: a head of 16 bytes, the kind at its byte 8).
 struct Counted {
   std::size_t ticks = 0, judged = 0, inside = 0, setpoints = 0;
   bool held = false, whole = false;

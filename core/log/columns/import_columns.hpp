@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "core/log/columns/flight_log.hpp"
+
+namespace backwash::log {
+
+/// How a table of somebody else's becomes a flight log (docs/interfaces.md, "Column map").
+struct ColumnMap {
+  struct Source {
+    std::string name;  ///< their column
+    std::string unit;  ///< of theirs; empty: ours
+  };
+  std::map<std::string, Source> columns;  ///< our column → theirs
+  bool ned = false;                       ///< their world is north, east, down; else z-up
+  bool frd = false;                       ///< their body is forward, right, down; else forward, left, up
+};
+
+/// How many of our unit one `unit` of theirs is, for our column: (x_m, "mm") is 0.001. Nothing: not a unit of it.
+std::optional<double> unit_factor(const std::string& column, const std::string& unit);
+/// The units that a column may be given in, ours first; empty for a name that is no column of a column map.
+std::vector<std::string> units_of(const std::string& column);
+/// Every column that a column map may name.
+std::vector<std::string> mappable_columns();
+/// Those of which a column map names all or none: the axes of a vector, the parts of an attitude, the rotors.
+std::vector<std::vector<std::string>> column_families();
+
+/// Reads a CSV table (also gzip's) by a column map: SI units, z-up world, body x forward, y left, z up. Rows are those
+/// that hold a position; every other column takes its latest number before (sensors have rates of their own), and what
+/// comes before the first of each is left out. Rows that repeat the stamp of the one before are left out. Time starts
+/// at 0. What somebody drew on after the last sample is cut off, and told in `notes`. Attitude: qw … qz, or roll,
+/// pitch, yaw (z-y-x). Acceleration: ax_mps2 …, or specific_force_x … turned by the attitude, gravity taken off.
+/// Velocity and acceleration that the table lacks are local_cubics'. Errors: as read_csv; a column that is not there;
+/// stamps that go back; fewer than 20 rows a second or more than 5000 (the unit of the time?); specific force without
+/// attitude; what physics contradicts (contradictions()).
+tl::expected<FlightLog, LogError> import_columns(const std::string& path, const ColumnMap& map,
+                                                 std::vector<std::string>* notes = nullptr);
+/// The same, whatever physics says of it.
+tl::expected<FlightLog, LogError> import_unchecked(const std::string& path, const ColumnMap& map,
+                                                   std::vector<std::string>* notes = nullptr);
+
+/// What in a log cannot be, each in one sentence: velocity is not the derivative of position, acceleration not that of
+/// velocity, gravity is still in it, the attitude does not tilt where the craft accelerates, thrust is no share of 1.
+/// A signed or scaled axis that would fit is named. Says nothing about what the flight did not move enough to show.
+std::vector<std::string> contradictions(const FlightLog& log);
+/// Those of them that no noise, estimator or accident of a flight explains: a factor of 3, a sign or another axis. And
+/// stamps that do not rise or are no seconds, velocities or accelerations that are 0 in every row while the craft
+/// moves, attitudes of no length or in another order.
+std::vector<std::string> impossible(const FlightLog& log);
+
+/// The columns of sensors that never spoke: the rpm, the motors' commands, the thrust or the battery, 0 in every row.
+std::vector<std::string> silent_columns(const FlightLog& log);
+
+}  // namespace backwash::log

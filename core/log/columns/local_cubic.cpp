@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/log/columns/local_cubic.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+
+namespace backwash::log {
+namespace {
+
+constexpr double kHalfWidth = 0.12;  // s
+constexpr std::size_t kLeastRows = 6;
+
+/// Through the rows [first, last) around time `at`.
+LocalMotion cubic(const std::vector<double>& t, const std::vector<Vec3>& p, std::size_t first, std::size_t last,
+                  double at) {
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+  Eigen::Matrix<double, 4, 3> right = Eigen::Matrix<double, 4, 3>::Zero();
+  for (std::size_t i = first; i < last; ++i) {
+    const double u = (t[i] - at) / kHalfWidth;
+    const Eigen::Vector4d basis(1, u, u * u, u * u * u);
+    normal += basis * basis.transpose();
+    right += basis * p[i].transpose();
+  }
+  const Eigen::Matrix<double, 4, 3> c = normal.ldlt().solve(right);
+  return {c.row(1) / kHalfWidth, 2 * c.row(2) / (kHalfWidth * kHalfWidth)};
+}
+
+}  // namespace
+
+std::vector<std::optional<LocalMotion>> local_cubics(const std::vector<double>& t, const std::vector<Vec3>& p) {
+  std::vector<std::optional<LocalMotion>> motion(t.size());
+  std::size_t first = 0, last = 0;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    while (t[first] < t[i] - kHalfWidth - 1e-9) ++first;
+    while (last < t.size() && t[last] <= t[i] + kHalfWidth + 1e-9) ++last;
+    const bool both_sides = t[i] - t[first] > 0.5 * kHalfWidth && t[last - 1] - t[i] > 0.5 * kHalfWidth;
+    if (last - first >= kLeastRows && both_sides) motion[i] = cubic(t, p, first, last, t[i]);
+  }
+  return motion;
+}
+
+std::vector<std::optional<LocalMotion>> local_cubics_but_for_holds(const std::vector<double>& t,
+                                                                   const std::vector<Vec3>& p) {
+  auto motion = local_cubics(t, p);
+  for (std::size_t first = 0, next = 0; first < t.size(); first = next) {
+    for (next = first + 1; next < t.size() && p[next] == p[first];) ++next;
+    const double end = t[std::min(next, t.size() - 1)];  // until something else was said
+    if (end - t[first] <= 2 * kHalfWidth) continue;
+    const auto from = std::lower_bound(t.begin(), t.end(), t[first] - kHalfWidth);
+    const auto to = std::upper_bound(t.begin(), t.end(), end + kHalfWidth);
+    std::fill(motion.begin() + (from - t.begin()), motion.begin() + (to - t.begin()), std::nullopt);
+  }
+  return motion;
+}
+
+}  // namespace backwash::log

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/windows/gates/gates.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "core/types/quantile.hpp"
+namespace backwash::study {
+namespace {
+
+/// Rows whose position is exactly that of the row before, at least frozen_rows and so many seconds in a row.
+std::vector<char> frozen_rows(const log::FlightLog& log, const std::vector<std::size_t>& rows, double seconds) {
+  const auto &x = log.column("x_m"), &y = log.column("y_m"), &z = log.column("z_m");
+  const auto repeats = [&](std::size_t k) {
+    const std::size_t i = rows[k], last = rows[k - 1];
+    return x[i] == x[last] && y[i] == y[last] && z[i] == z[last];
+  };
+  std::vector<char> frozen(rows.size());
+  for (std::size_t k = 1; k < rows.size();) {
+    std::size_t end = k;
+    while (end < rows.size() && repeats(end)) ++end;
+    if (static_cast<double>(end - k + 1) >= kWindowRules.frozen_rows &&
+        log.t_s[rows[end - 1]] - log.t_s[rows[k - 1]] >= seconds)
+      std::fill(frozen.begin() + static_cast<std::ptrdiff_t>(k - 1), frozen.begin() + static_cast<std::ptrdiff_t>(end),
+                char{1});
+    k = std::max(end, k + 1);
+  }
+  return frozen;
+}
+
+}  // namespace
+
+const char* to_string(Gate gate) noexcept {
+  constexpr const char* kNames[] = {"frozen", "perched", "saturated", "transit", "gap", "inconsistent", "outside"};
+  return kNames[static_cast<std::size_t>(gate)];
+}
+
+bool ByName::operator()(Gate a, Gate b) const noexcept { return std::strcmp(to_string(a), to_string(b)) < 0; }
+
+std::vector<SampleRange> unbroken(const std::vector<double>& t, const WindowOptions& options) {
+  if (t.empty()) return {};
+  std::vector<double> spacing;
+  for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
+  const double longest =
+      spacing.empty() ? 0 : std::max(options.gap_s, options.gap_periods * quantile(std::move(spacing), 0.5));
+  std::vector<SampleRange> stretches{{0, 1}};
+  for (std::size_t i = 1; i < t.size(); ++i) {
+    if (t[i] - t[i - 1] > longest) stretches.push_back({i, i});
+    stretches.back().end = i + 1;
+  }
+  return stretches;
+}
+
+LogGates::LogGates(const log::FlightLog& log, std::vector<std::size_t> rows, const std::optional<Vehicle>& vehicle,
+                   const WindowOptions& options)
+    : log_(log),
+      rows_(std::move(rows)),
+      vehicle_(vehicle),
+      options_(options),
+      frozen_(frozen_rows(log, rows_, options.frozen_s)) {
+  for (const char* name : {"motor1", "motor2", "motor3", "motor4"})
+    if (log.has(name)) motors_.push_back(&log.column(name));
+  commands_ = motors_;
+  if (log.has("thrust")) commands_.push_back(&log.column("thrust"));
+}
+
+bool LogGates::rotors_rest(SampleRange w) const {
+  if (motors_.size() < 4) return false;
+  for (std::size_t k = w.begin; k < w.end; ++k)
+    if (std::all_of(motors_.begin(), motors_.end(), [&](auto* m) { return (*m)[rows_[k]] <= options_.idle; }))
+      return true;
+  return false;
+}
+
+bool LogGates::perched(SampleRange w) const {
+  const double n = static_cast<double>(w.size());
+  const auto mean = [&](auto value) {
+    double sum = 0;
+    for (std::size_t k = w.begin; k < w.end; ++k) sum += value(rows_[k]) / n;
+    return sum;
+  };
+  double most = 0;
+  for (const char* axis : {"x_m", "y_m", "z_m"}) {
+    const auto& x = log_.column(axis);
+    const double middle = mean([&](std::size_t row) { return x[row]; });
+    most = std::max(most, mean([&](std::size_t row) { return std::pow(x[row] - middle, 2); }));
+  }
+  if (std::sqrt(most) < options_.perched_m || rotors_rest(w)) return true;
+  if (log_.has("thrust") && vehicle_) {
+    const auto& u = log_.column("thrust");
+    const double thrust =
+        vehicle_->propulsion.max_thrust * mean([&](std::size_t row) { return thrust_share(*vehicle_, u[row]); });
+    if (thrust < options_.perched_thrust * vehicle_->body.mass * kGravity) return true;
+  }
+  if (!log_.has("stood_z_m")) return false;
+  const auto &z = log_.column("z_m"), &stood = log_.column("stood_z_m");
+  return mean([&](std::size_t row) { return z[row] - stood[row]; }) < options_.clear_m;
+}
+
+std::optional<Gate> LogGates::operator()(SampleRange w) const {
+  for (std::size_t k = w.begin; k < w.end; ++k)
+    if (frozen_[k]) return Gate::frozen;
+  if (perched(w)) return Gate::perched;
+  std::size_t saturated = 0;
+  for (std::size_t k = w.begin; k < w.end; ++k)
+    saturated += std::any_of(commands_.begin(), commands_.end(), [&](auto* c) {
+      const double u = (*c)[rows_[k]];
+      return u <= options_.limit || u >= 1 - options_.limit;
+    });
+  if (static_cast<double>(saturated) > options_.saturated_share * static_cast<double>(w.size())) return Gate::saturated;
+  return std::nullopt;
+}
+
+bool simulated(const Series& s) { return s.simulated_by_thrust || !s.a_nominal.empty(); }
+
+bool under_way(const Series& s, SampleRange w, const WindowOptions& options) {
+  for (std::size_t a = w.begin, b = w.begin; b < w.end; ++b) {
+    while (s.t[b] - s.t[a] > options.still_s) ++a;
+    const double time = s.t[b] - s.t[a];
+    if (time > kWindowRules.still_enough * options.still_s && (s.p[b] - s.p[a]).norm() > options.still_mps * time)
+      return true;
+  }
+  return false;
+}
+
+std::optional<Gate> unfit(const Series& s, const log::FlightLog& log, SampleRange w, const WindowOptions& options) {
+  if (!simulated(s) && !log.has("motor1") && under_way(s, w, options)) return Gate::transit;
+  if (!s.has_velocity) return std::nullopt;
+  const double time = s.t[w.end - 1] - s.t[w.begin];
+  Vec3 flown = Vec3::Zero();
+  for (std::size_t i = w.begin + 1; i < w.end; ++i) flown += 0.5 * (s.v[i] + s.v[i - 1]) * (s.t[i] - s.t[i - 1]);
+  const Vec3 off = s.p[w.end - 1] - s.p[w.begin] - flown;  // position and velocity must tell the same story
+  if ((off / time).norm() > options.inconsistent_mps) return Gate::inconsistent;
+  return std::nullopt;
+}
+
+}  // namespace backwash::study

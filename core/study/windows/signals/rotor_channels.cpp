@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/windows/signals/rotor_channels.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "core/log/columns/median.hpp"
+#include "core/study/windows/gates/window_rules.hpp"
+#include "core/study/windows/observation.hpp"
+#include "core/study/windows/signals/signals.hpp"
+
+namespace backwash::study {
+namespace {
+
+std::string name_of(const char* kind, std::size_t rotor) { return kind + std::to_string(rotor + 1); }
+
+using Rates = std::array<std::optional<double>, 4>;  // Hz
+
+Rates rates_of(const RotorPhases& phases, const Series& s, std::size_t begin, std::size_t end) {
+  Rates rates;
+  for (std::size_t rotor = 0; rotor < rates.size(); ++rotor)
+    if (const auto& phase = phases[rotor]; !phase.empty())
+      rates[rotor] = (phase[end - 1] - phase[begin]) / (2 * std::numbers::pi * (s.t[end - 1] - s.t[begin]));
+  return rates;
+}
+
+/// Whether a rotor's line is its value in this window, and not that of another one whose line it is, too.
+bool speaks(const Rates& rates, std::size_t rotor, std::size_t turn) {
+  constexpr double kApart = kWindowRules.line_alike / kWindowRules.line_block;
+  std::vector<std::size_t> alike;
+  for (std::size_t other = 0; other < rates.size(); ++other)
+    if (rates[other] && std::abs(*rates[other] - *rates[rotor]) < kApart) alike.push_back(other);
+  return alike.empty() || alike[turn % alike.size()] == rotor;  // none: no rate is a number
+}
+
+}  // namespace
+
+RotorPhases rotor_phases(const log::FlightLog& log, const Series& s) {
+  RotorPhases phases;
+  for (std::size_t rotor = 0; rotor < 4; ++rotor) {
+    if (!log.has(name_of("rpm", rotor))) continue;
+    const auto& rpm = log.column(name_of("rpm", rotor));
+    auto& phase = phases[rotor];
+    phase.assign(s.size(), 0);
+    for (std::size_t i = 1; i < s.size(); ++i) {
+      const double a = rpm[s.row[i - 1]], b = rpm[s.row[i]], c = rpm[s.row[std::min(i + 1, s.size() - 1)]];
+      const double middle = std::max(std::min(a, b), std::min(std::max(a, b), c));
+      phase[i] = phase[i - 1] + 2 * std::numbers::pi * middle / 60 * (s.t[i] - s.t[i - 1]);
+    }
+  }
+  return phases;
+}
+
+std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
+                                     const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
+                                     std::size_t end, std::size_t turn,
+                                     std::array<std::optional<RotorLine>, 4>& lines) {
+  std::vector<RotorValue> values;
+  std::array<double, 4> share{}, ratio{};
+  bool motors = true, rpms = true;
+  const std::span<const double> t(s.t.data() + begin, end - begin);
+  const Rates rates = rates_of(phases, s, begin, end);
+  for (std::size_t rotor = 0; rotor < 4; ++rotor) {
+    const bool has_motor = log.has(name_of("motor", rotor)), has_rpm = log.has(name_of("rpm", rotor));
+    motors = motors && has_motor;
+    rpms = rpms && has_rpm;
+    if (has_motor) {
+      const auto& motor = log.column(name_of("motor", rotor));
+      double sum = 0;
+      for (std::size_t i = begin; i < end; ++i)
+        sum += thrust_share(vehicle, motor[s.row[i]]) / static_cast<double>(end - begin);
+      share[rotor] = std::log(std::max(sum, kWindowRules.least_motor.value));
+    }
+    if (has_rpm) {
+      const auto& rpm = log.column(name_of("rpm", rotor));
+      std::vector<double> readings;
+      for (std::size_t i = begin; i < end; ++i) readings.push_back(rpm[s.row[i]]);
+      const double middle = log::median(readings);
+      double bad = 0;
+      for (std::size_t i = 0; i < readings.size(); ++i) {
+        const bool stuck = i > 1 && readings[i] == readings[i - 1] && readings[i] == readings[i - 2];
+        bad += readings[i] < kWindowRules.dropout * middle || stuck ? 1.0 : 0.0;
+      }
+      values.push_back({kDropout1 + rotor, bad / static_cast<double>(readings.size()), 1});
+      ratio[rotor] = 2 * std::log(std::max(middle, kWindowRules.least_rpm.value));
+      const std::span<const double> phase(phases[rotor].data() + begin, end - begin);
+      lines[rotor] = rotor_line(residual, t, phase);
+      if (lines[rotor] && speaks(rates, rotor, turn)) values.push_back({kLine1 + rotor, lines[rotor]->excess, 1});
+    }
+  }
+  const auto put_contrast = [&](std::size_t channel, const std::array<double, 4>& x) {
+    const double mean = (x[0] + x[1] + x[2] + x[3]) / 4;
+    for (std::size_t rotor = 0; rotor < 4; ++rotor) values.push_back({channel + rotor, x[rotor] - mean, 1});
+  };
+  if (motors) put_contrast(kMotor1, share);
+  if (motors && rpms) {
+    for (std::size_t rotor = 0; rotor < 4; ++rotor) ratio[rotor] -= share[rotor];
+    put_contrast(kRpm1, ratio);
+  } else if (rpms) {
+    put_contrast(kRpm1, ratio);
+  }
+  return values;
+}
+
+}  // namespace backwash::study

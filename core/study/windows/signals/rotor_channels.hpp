@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+
+#include "core/study/windows/signals/series.hpp"
+#include "core/study/windows/signals/signals.hpp"
+
+namespace backwash::study {
+
+/// Phase of each rotor at every sample, rad: the integral of its rpm reading (median of three, so that a dropout does
+/// not turn it). Empty where the log has no such column.
+using RotorPhases = std::array<std::vector<double>, 4>;
+RotorPhases rotor_phases(const log::FlightLog& log, const Series& s);
+
+/// Value of a rotor channel (observation.hpp) in one window.
+struct RotorValue {
+  std::size_t channel;
+  double value, weight;
+};
+/// Lines, motor shares, rpm against command and dropouts of the rows [begin, end). `residual`: detrended vertical
+/// residual of those rows, m/s². `lines`: each rotor's, where the log tells its rate. Rotors of one rate have one line,
+/// which must not count several times: it is the value of one of them, of each in `turn` (the window's number).
+std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
+                                     const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
+                                     std::size_t end, std::size_t turn, std::array<std::optional<RotorLine>, 4>& lines);
+
+}  // namespace backwash::study

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <utility>
+
+#include "core/log/autopilot/dataflash.hpp"
+#include "core/log/autopilot/same_flight.hpp"
+#include "core/log/autopilot/ulog.hpp"
+#include "core/log/columns/import_airgarage.hpp"
+#include "core/log/columns/import_columns.hpp"
+#include "core/log/columns/import_crazypad.hpp"
+#include "core/log/columns/labels.hpp"
+#include "services/backwash/files.hpp"
+#include "services/backwash/json.hpp"
+#include "services/backwash/site/column_map.hpp"
+#include "services/backwash/verb.hpp"
+
+namespace backwash::services {
+namespace {
+
+/// Reads a recording; what was left out of it, a sentence each, goes to `notes`.
+using Importer = std::function<tl::expected<log::FlightLog, log::LogError>(const std::string& path,
+                                                                           std::vector<std::string>& notes)>;
+
+/// Kinds of recordings; add a line for a new one.
+constexpr struct {
+  const char* kind;
+  tl::expected<log::FlightLog, log::LogError> (*import)(const std::string& path);
+} kImporters[] = {
+    {"airgarage", log::import_airgarage},
+    {"ardupilot", log::read_dataflash},
+    {"crazypad", log::import_crazypad},
+    {"ulog", log::read_ulog},
+};
+
+struct ImportOptions {
+  std::string kind, folder, map_columns, labels;
+  std::vector<std::string> files;  ///< after `kind`, which is the first of them with a column map
+  bool propose = false, json = false, force = false;
+};
+
+Importer importer(const std::string& kind) {
+  std::string known;
+  for (const auto& entry : kImporters) {
+    if (kind == entry.kind) return [import = entry.import](const std::string& path, auto&) { return import(path); };
+    known += (known.empty() ? "" : ", ") + std::string(entry.kind);
+  }
+  throw Failure(kUsage, "'" + kind + "' is no kind of recording; known are " + known);
+}
+
+/// The importer that the options name, and the recordings.
+std::pair<Importer, std::vector<std::string>> importer_of(const ImportOptions& options) {
+  if (options.map_columns.empty()) {
+    auto import = importer(options.kind);
+    if (options.files.empty()) throw Failure(kUsage, "no recording given after the kind '" + options.kind + "'");
+    return {std::move(import), options.files};
+  }
+  const auto map = read_column_map(options.map_columns);
+  if (!map)
+    throw Failure(map.error().kind == config::ConfigError::Kind::not_found ? kNoInput : kConfiguration,
+                  map.error().message);
+  std::vector<std::string> files{options.kind};
+  files.insert(files.end(), options.files.begin(), options.files.end());
+  return {[map = *map](const std::string& path, auto& notes) { return log::import_columns(path, map, &notes); }, files};
+}
+
+[[noreturn]] void fail(const log::LogError& error) {
+  throw Failure(error.kind == log::LogError::Kind::not_found ? kNoInput : kBadData, error.message);
+}
+
+int propose(const ImportOptions& options) {
+  if (!options.files.empty()) throw Failure(kUsage, "--propose looks at one table; give one");
+  if (!options.folder.empty() || !options.labels.empty())
+    throw Failure(kUsage, "--propose prints and writes nothing; give it without --out and --labels");
+  const auto text = proposed_column_map(options.kind);
+  if (!text) fail(text.error());
+  std::fputs(text->c_str(), stdout);
+  return kOk;
+}
+
+/// Which flight this is already known as; empty: none.
+std::string known_as(const log::FlightMark& mark, const std::vector<std::pair<std::string, log::FlightMark>>& known) {
+  for (const auto& [name, other] : known)
+    if (const double shared = mark.shared(other); shared >= log::kSameFlight)
+      return std::to_string(static_cast<int>(100 * shared)) + " % of the positions are those of " + name +
+             ": the same flight under two names";
+  return {};
+}
+
+/// FOLDER/NAME.csv; of NAME.csv.gz as well.
+std::string target(const std::string& folder, const std::string& file) {
+  return (std::filesystem::path(folder) / log::recording_name(file)).string() + ".csv";
+}
+
+log::Labels labels_of(const ImportOptions& options) {
+  if (options.labels.empty()) return {};
+  auto labels = log::read_labels(options.labels);
+  if (!labels) fail(labels.error());
+  return std::move(*labels);
+}
+
+/// Puts what the labels say of a recording into its log; of one that they do not hold, a note.
+void add_labels(log::FlightLog& log, const log::Labels& labels, const std::string& labels_file, const std::string& file,
+                std::vector<std::string>& notes) {
+  if (labels_file.empty()) return;
+  const auto of = labels.find(log::recording_name(file));
+  if (of == labels.end()) return notes.push_back(file + ": " + labels_file + " has no row for it");
+  if (const auto added = log::add_labels(log, of->second, labels_file); !added) fail(added.error());
+}
+
+int run(const ImportOptions& options) {
+  if (options.propose) return propose(options);
+  const auto [read, files] = importer_of(options);
+  if (options.folder.empty()) throw Failure(kUsage, "--out is required: the folder for the flight logs");
+  std::error_code error;
+  std::filesystem::create_directories(options.folder, error);
+  if (!std::filesystem::is_directory(options.folder))
+    throw Failure(kCannotCreate, options.folder + ":1: cannot be created; name a folder that can be written");
+  std::vector<std::string> targets;
+  for (const auto& file : files) targets.push_back(target(options.folder, file));
+  check_outputs(targets, options.force);
+  const auto labels = labels_of(options);
+  Json logs = Json::array(), refused = Json::array();
+  std::vector<std::pair<std::string, log::FlightMark>> known;
+  std::vector<std::string> notes;
+  for (const auto& file : files) {
+    auto log = read(file, notes);
+    if (!log) {
+      // A recording without rows is not the end of a hundred others; alone it is an error.
+      if (files.size() == 1 || log.error().kind == log::LogError::Kind::not_found) fail(log.error());
+      refused.push_back(log.error().message);
+      continue;
+    }
+    log::FlightMark mark(*log);
+    if (const auto same = known_as(mark, known); !same.empty()) {
+      refused.push_back(file + ":1: " + same);
+      continue;
+    }
+    known.emplace_back(file, std::move(mark));
+    add_labels(*log, labels, options.labels, file, notes);
+    write_log(target(options.folder, file), *log, options.force);
+    logs.push_back(Json{{"log", target(options.folder, file)}, {"rows", log->t_s.size()}});
+  }
+  if (logs.empty()) throw Failure(kBadData, refused.front().get<std::string>());
+  if (options.json) {
+    print(Json{{"kind", options.map_columns.empty() ? options.kind : "columns"},
+               {"logs", logs},
+               {"refused", refused},
+               {"notes", notes}});
+  } else {
+    std::printf("%zu flight logs written to %s\n", logs.size(), options.folder.c_str());
+    for (const auto& note : notes) std::printf("%s\n", note.c_str());
+    for (const auto& why : refused) std::printf("left out: %s\n", why.get<std::string>().c_str());
+  }
+  return kOk;
+}
+
+}  // namespace
+
+Verb import_verb(Command& app) {
+  auto options = std::make_shared<ImportOptions>();
+  auto& command = app.add_subcommand("import", "Recordings of others as flight logs");
+  command.add_option("kind", options->kind, "airgarage, ardupilot (.bin), crazypad or ulog; left out with a column map")
+      .required();
+  command.add_option("files", options->files, "recordings");
+  command.add_option("-o,--out", options->folder, "folder for the flight logs, one CSV each");
+  command.add_option("--map-columns", options->map_columns, "column map (TOML): recordings are tables, CSV or .csv.gz");
+  command.add_option("--labels", options->labels,
+                     "table (CSV) of what is known of each recording: its name under recording, and a column a label");
+  command.add_flag("--propose", options->propose,
+                   "print a column map for one table, guessed and checked; writes nothing");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "overwrite logs that exist");
+  command.footer(
+      "Example:\n  backwash import airgarage 20240823_16_23_49.csv -o logs\n"
+      "  backwash import --propose flight.csv > map.toml\n  backwash import --map-columns map.toml flight*.csv -o "
+      "logs");
+  return {&command, [options] { return run(*options); }};
+}
+
+}  // namespace backwash::services

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwash/fly/story_page.hpp"
+
+#include <cmath>
+#include <sstream>
+
+#include "core/report/flight_report.hpp"
+#include "core/report/page/figure_parts.hpp"
+#include "core/report/page/interactive.hpp"
+#include "core/report/page/page.hpp"
+#include "core/report/recorded_tables.hpp"
+#include "services/backwash/fly/flight_story_output.hpp"
+#include "services/backwash/page_parts.hpp"
+#include "services/backwash/verb.hpp"
+#include "version.hpp"
+
+namespace backwash::services {
+namespace {
+
+/// What positions and clearances are, and what they are worth.
+std::string basis(const FlightStory& story) {
+  std::string text = story.by_truth
+                         ? "Positions and clearances are the truth's; samples are what the vehicle measured itself."
+                         : "No truth was given: positions are those that the vehicle measured itself, and clearances "
+                           "hold up to the error of its estimate.";
+  const JudgedMaps& m = story.maps;
+  if (m.window_clouds > 0)
+    text +=
+        " What the mapper's window showed is not in the log: obstacles and the field are those of the last whole "
+        "map alone" +
+        std::string(m.accepted_s.empty() ? ", and there was none." : ".");
+  else if (m.accepted_s.size() > 1)
+    text += " Obstacles and the field are drawn of the last of " + std::to_string(m.accepted_s.size()) + " maps.";
+  return text;
+}
+
+/// What is said of obstacles where all is good.
+std::string untouched(const JudgedMaps& m) {
+  if (m.judged + m.not_judged == 0) return "no clearance to judge";
+  if (m.not_judged == 0) return "nothing touched";
+  if (m.judged == 0) return "clearances could not be judged";
+  return "nothing touched where that could be judged, in " + std::to_string(m.judged) + " of " +
+         std::to_string(m.judged + m.not_judged) + " ticks";
+}
+
+report::DataTable path_table(const FlightStory& story) {
+  report::DataTable table{"path", {"t_s", "x_m", "y_m", "z_m", "command_x_m", "command_y_m", "command_z_m"}, {}, 0};
+  for (const auto& s : story.samples) {
+    const Vec3 &p = s.p_W, &c = s.command_W;
+    table.rows.push_back({s.t_s, p.x(), p.y(), p.z()});
+    for (const double value : {c.x(), c.y(), c.z()})  // on the ground nothing is commanded
+      table.rows.back().push_back(s.in_air ? value : report::kNoValue);
+  }
+  return report::thinned(std::move(table));
+}
+
+report::DataTable clearance_table(const FlightStory& story) {
+  report::DataTable table{"clearance", {"t_s", "clearance_m"}, {}, 0};
+  for (const auto& s : story.samples) table.rows.push_back({s.t_s, s.clearance_m.value_or(report::kNoValue)});
+  return report::thinned(std::move(table));
+}
+
+report::Figure path_figure(const FlightStory& story, const report::DataTable& path, const map::OccupancyGrid* map,
+                           std::span<const report::Prism> tube) {
+  Vec3 low = story.samples.front().p_W, high = low;
+  for (const auto& s : story.samples) {
+    low = low.cwiseMin(s.p_W);
+    high = high.cwiseMax(s.p_W);
+  }
+  std::ostringstream data;
+  data << "$flown << EOD\n";
+  for (const auto& row : path.rows)
+    if (!std::isnan(row[4])) data << row[1] << ' ' << row[2] << ' ' << row[4] << ' ' << row[5] << '\n';
+  // A row apart, to which no line leads: a flight that never took off has no other.
+  data << '\n' << low.x() << ' ' << low.y() << ' ' << low.x() << ' ' << low.y() << "\nEOD\n" << report::kAxes;
+  std::string cells;
+  if (map) {
+    const auto inside = [&](const Vec3& p) {
+      return Index3(map->index(p).cwiseMax(Index3::Zero()).cwiseMin(map->size() - Index3::Ones()));
+    };
+    const Index3 first = inside(low - Vec3(1, 1, 0)), last = inside(high + Vec3(1, 1, 0));
+    data << report::cell_blocks(*map, first, last, map->center(last).z(), map->center(last).z())
+         << report::view_from_above(*map, first, last);
+    cells = report::plot_cells();
+  } else {
+    data << "set size ratio -1\nset xlabel 'x, m'\nset ylabel 'y, m'\n";
+  }
+  if (!tube.empty()) {
+    data << report::outlines("tube", tube, 0);
+    cells += report::plot_band("tube", "#9cc6ec", "#4a8fce", "sets predicted");
+  }
+  data << "set key outside top center horizontal\nplot " << cells
+       << "$flown using 3:4 with lines linewidth 1.5 linecolor '#888888' title 'commanded', $flown using 1:2 with "
+          "lines linewidth 2 linecolor '#c8371d' title 'flown'\n";
+  return report::draw(data.str(), report::Format::svg, 1000, 520);
+}
+
+/// Where it was in the air; of a flight that never was, where it stood.
+std::vector<Vec3> way_of(const FlightStory& story) {
+  std::vector<Vec3> way_W;
+  for (const auto& s : story.samples)
+    if (s.in_air) way_W.push_back(s.p_W);
+  if (way_W.empty()) way_W.push_back(story.samples.front().p_W);
+  return way_W;
+}
+
+/// The figures of where it was, with their tables.
+std::vector<report::Section> sections_of(const FlightStory& story, std::span<const log::RawRecord> log,
+                                         const map::OccupancyGrid* map, const plan::World* world,
+                                         report::PageData& data) {
+  std::vector<report::Section> sections;
+  const auto path = path_table(story), clearance = clearance_table(story);
+  const auto error = report::recorded_error(log, story.zero_ns);
+  sections.push_back({"From above", basis(story), path_figure(story, path, map, data.scene->tube), {}, {"path"}});
+  if (world) {
+    sections.push_back(report::field_section(way_of(story), *world));
+    data.field = report::field_box(*world, report::field_view(world->grid, way_of(story)));
+  }
+  const auto add = [&](const report::DataTable& table, const char* title, const char* text,
+                       std::vector<report::TimePlot> plots) {
+    report::add_plots(sections, data, table, title, text, std::move(plots));
+  };
+  add(path, "Height", "Commands are drawn in the air alone.",
+      {{"height", "path", "height", "m", {{"command_z_m", "commanded", "commanded"}, {"z_m", "flown", "flown"}}}});
+  add(error, "Error between its bounds", "Measured position minus the predicted centre, as each tick logged it.",
+      report::error_plots(false));
+  add(clearance, "Clearance", "On the routes, body to the nearest obstacle.",
+      {{"clearance", "clearance", "clearance", "m", {{"clearance_m", "body to the nearest obstacle", "flown"}}}});
+  return sections;
+}
+
+/// Path, sets and map in three dimensions.
+report::Scene scene_of(const FlightStory& story, std::span<const log::RawRecord> log, const map::OccupancyGrid* map,
+                       double radius) {
+  std::vector<Vec3> path_W;
+  for (const auto& s : story.samples) path_W.push_back(s.p_W);
+  report::Scene scene{"path", report::at_intervals(report::recorded_tube(log)), {}, radius};
+  if (map) scene.faces = report::map_faces(*map, path_W);
+  return scene;
+}
+
+std::string row(const std::string& name, const std::string& value) {
+  return "<tr><th>" + name + "</th><td>" + report::escaped(value) + "</td></tr>\n";
+}
+
+std::string figures_table(const FlightStory& s) {
+  std::string text = "<section><h2>In figures</h2>\n<p>" + basis(s) + "</p>\n<table>\n";
+  text += row("The log ends", s.ended);
+  text += row("Time, way in the air", to_text(s.time_s, 2) + " s, " + to_text(s.length_m, 2) + " m");
+  text += row("Take-offs / landings / holds / refused commands",
+              std::to_string(s.take_offs) + " / " + std::to_string(s.landings) + " / " + std::to_string(s.holds) +
+                  " / " + std::to_string(s.refusals));
+  text += row("Clearances", clearances_of(s));
+  if (s.maps.not_judged + s.maps.not_judged_rising > 0)
+    text += row("Ticks without a clearance, on routes / take-offs",
+                std::to_string(s.maps.not_judged) + " / " + std::to_string(s.maps.not_judged_rising));
+  if (s.maps.window_clouds > 0) text += row("Mapper's window", window_of(s.maps));
+  text += row("Largest error over bound, x / y / z", to_text(s.largest_ratio.x(), 2) + " / " +
+                                                         to_text(s.largest_ratio.y(), 2) + " / " +
+                                                         to_text(s.largest_ratio.z(), 2));
+  text += row("Samples inside", std::to_string(s.inside) + " of " + std::to_string(s.judged));
+  text += row("Decided again from what the daemon was told", replay_of(s));
+  if (s.beyond_truth > 0)
+    text += row("Ticks that the truth does not cover, judged as measured", std::to_string(s.beyond_truth));
+  text += row("Records lost", std::to_string(s.records_lost));
+  return text + "</table>\n</section>\n";
+}
+
+std::string pieces_table(const FlightStory& s) {
+  if (s.pieces.empty()) return "";
+  std::string text = "<section><h2>What was flown</h2>\n<table>\n";
+  for (const auto& p : s.pieces)
+    text += row(to_text(p.from_s, 2) + " to " + to_text(p.until_s, 2) + " s, " + name_of(p),
+                "to " + to_text(p.goal_W) + " m: " + end_of(p) + "; " + std::to_string(p.inside) + " of " +
+                    std::to_string(p.samples) + " samples inside");
+  return text + "</table>\n</section>\n";
+}
+
+/// Which map judged which part of the way. Nothing where one judged all.
+std::string maps_table(const JudgedMaps& m) {
+  if (m.stretches.empty() || (m.stretches.size() == 1 && m.not_judged == 0)) return "";
+  std::string text =
+      "<section><h2>What clearances were judged by</h2>\n<p>Each place by the whole map that was the "
+      "newest then, of " +
+      std::to_string(m.accepted_s.size()) + ".</p>\n<table>\n";
+  for (const auto& stretch : m.stretches)
+    text += row(to_text(stretch.from_s, 2) + " to " + to_text(stretch.until_s, 2) + " s", by_of(stretch));
+  return text + "</table>\n</section>\n";
+}
+
+}  // namespace
+
+std::string story_page(const FlightStory& s, std::span<const log::RawRecord> log, const map::OccupancyGrid* map,
+                       const StoryContext& context) {
+  std::string page =
+      "<h1>A flight of the daemon, from its raw log</h1>\n<p class=\"context\">" + report::escaped(context.log) +
+      "; backwash " + report::escaped(kVersion) + "</p>\n<p class=\"verdict " + (s.ok() ? "passed" : "failed") + "\">" +
+      report::escaped(s.ok() ? "Every goal reached, " + untouched(s.maps) + ", every sample inside its set."
+                             : "Not good: " + why(s) + ".") +
+      "</p>\n";
+  page += report::timeline_html(s.timeline);
+  report::PageData data;
+  data.modes = s.timeline.modes;
+  std::vector<report::Section> sections;
+  if (!s.samples.empty()) {
+    data.scene = scene_of(s, log, map, context.body_radius);
+    page += report::scene_html(*data.scene);
+    sections = sections_of(s, log, map, context.world, data);
+  }
+  for (auto& section : report::recorded_sections(log, s.zero_ns, data)) sections.push_back(std::move(section));
+  for (const auto& section : sections) {
+    if (!section.drawing) throw Failure(kUnavailable, section.drawing.error().message);
+    page += report::to_html(section);
+  }
+  page += figures_table(s) + pieces_table(s) + maps_table(s.maps);
+  auto parameters = context.parameters;
+  parameters.emplace_back("As the daemon had them", report::recorded_configuration(log));
+  const auto moved = report::interactive(data, report::javascript_folders());
+  page += report::parameters_html(own_command(), parameters) + moved.notes;
+  return report::html_page("backwash flight", page, moved.scripts);
+}
+
+}  // namespace backwash::services

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "services/backwash/learn/calibrate_page.hpp"
+
+#include <cmath>
+
+#include "core/report/flight_report.hpp"
+#include "core/report/page/page.hpp"
+#include "core/study/calibrate/bound_figure.hpp"
+#include "core/study/calibrate/model_text.hpp"
+#include "core/types/formatted.hpp"
+#include "services/backwash/page_parts.hpp"
+#include "services/backwash/verb.hpp"
+#include "version.hpp"
+
+namespace backwash::services {
+namespace {
+
+using namespace study::calibrate;
+
+std::string cells(std::initializer_list<std::string> texts, const char* first = "th") {
+  std::string row = "<tr>";
+  for (const auto& text : texts) {
+    row += std::string("<") + first + ">" + text + "</" + first + ">";
+    first = "td";
+  }
+  return row + "</tr>\n";
+}
+
+template <class... Text>
+std::string heads(Text... texts) {
+  std::string row = "<thead><tr>";
+  ((row += std::string("<th>") + texts + "</th>"), ...);
+  return row + "</tr></thead>\n";
+}
+
+std::string share(double part) { return to_text(part, 2); }
+
+std::string verdict_of(const Calibration& c, double quantile) {
+  const auto& h = c.held_out;
+  return "<p class=\"verdict\">Of flights that were not fitted, " + share(h.coverage.x()) +
+         " of the windows lay below the bound along x, " + share(h.coverage.y()) + " along y, " +
+         share(h.coverage.z()) + " along z; " + share(quantile) + " was asked. The bound is " +
+         to_text(h.bound_over_observed.x(), 1) + ", " + to_text(h.bound_over_observed.y(), 1) + " and " +
+         to_text(h.bound_over_observed.z(), 1) + " times the median variance.</p>\n";
+}
+
+std::string constants(const Calibration& c) {
+  std::string text =
+      "<section><h2>Constants</h2>\n<p>With 95 % intervals, by resampling whole flights. An interval that reaches 0: "
+      "these flights cannot tell.</p>\n<div class=\"scroll\"><table class=\"wide\">\n" +
+      heads("constant", "value", "95 % interval", "");
+  const auto line = [&](const std::string& name, double value, const Interval& ci) {
+    text += cells(
+        {name, formatted("%.4g", value), formatted("%.4g … %.4g", ci.low, ci.high), ci.low <= 0 ? "reaches 0" : ""});
+  };
+  for (std::size_t p = 0; p < kParameters; ++p)
+    if (c.determined[p]) line(std::string(key(static_cast<Parameter>(p))), c.fitted.parameters[p], c.ci95[p]);
+  line("bound.tau_w, s", c.tau_w.value, c.tau_w.ci95);
+  if (c.push) {
+    line("bound.mean.horizontal, m/s²", c.push->horizontal.value, c.push->horizontal.ci95);
+    line("bound.mean.vertical, m/s²", c.push->vertical.value, c.push->vertical.ci95);
+  }
+  return text + "</table></div>\n</section>\n";
+}
+
+std::string bins(const std::vector<Bin>& all, const char* title, const char* what) {
+  std::string text =
+      std::string("<section><h2>Below the bound, by ") + title +
+      "</h2>\n<p>Share of the windows of flights that were not fitted. Where it is small, or there are few "
+      "windows, hover there.</p>\n<table class=\"wide\">\n" +
+      heads(what, "windows", "x", "y", "z");
+  for (const auto& b : all) {
+    const std::string range = to_text(b.low, 2) + (std::isfinite(b.high) ? " to " + to_text(b.high, 2) : " and more");
+    if (b.windows == 0)
+      text += cells({range, "0", "–", "–", "–"});
+    else
+      text += cells(
+          {range, std::to_string(b.windows), share(b.coverage.x()), share(b.coverage.y()), share(b.coverage.z())});
+  }
+  return text + "</table>\n</section>\n";
+}
+
+std::string flights(const Assessment& a, const std::vector<std::string>& logs) {
+  std::string text =
+      "<section><h2>Below the bound, by flight</h2>\n<p>Each against a fit without it.</p>\n<table class=\"wide\">\n" +
+      heads("log", "windows", "x", "y", "z");
+  for (std::size_t f = 0; f < logs.size(); ++f) {
+    const Vec3& c = a.flight_coverage[f];
+    text += cells(
+        {report::escaped(logs[f]), std::to_string(a.flight_windows[f]), share(c.x()), share(c.y()), share(c.z())});
+  }
+  return text + "</table>\n</section>\n";
+}
+
+std::string refusals_html(std::span<const Refusal> refused) {
+  if (refused.empty()) return "";
+  std::string text =
+      "<section><h2>Not determined</h2>\n<p>These stay the base model's, and what would decide them.</p>\n<table "
+      "class=\"wide\">\n" +
+      heads("constants", "why", "fly");
+  for (const auto& r : refused)
+    text += cells({report::escaped(r.what), report::escaped(r.why), report::escaped(r.flight)});
+  return text + "</table>\n</section>\n";
+}
+
+std::string left_out(const Campaign& campaign) {
+  std::string text = "<section><h2>What the logs held</h2>\n<table>\n" +
+                     cells({"Windows of 2 s that count", std::to_string(campaign.windows)});
+  for (std::size_t g = 0; g < study::kHoverGates; ++g)
+    if (campaign.gated[g] > 0)
+      text += cells({std::string("Left out: ") + study::to_string(static_cast<study::Gate>(g)),
+                     std::to_string(campaign.gated[g])});
+  for (const auto& what : campaign.not_tested) text += cells({"Not tested", report::escaped(what)});
+  if (campaign.height && campaign.height->ceiling) {
+    const auto& c = *campaign.height->ceiling;
+    text += cells({"Below a ceiling, variance along z by",
+                   formatted("%.3g (%.3g … %.3g): the model has no term for it", c.value, c.ci95.low, c.ci95.high)});
+  }
+  return text + "</table>\n</section>\n";
+}
+
+std::string surfaces(const Calibration& c, const Campaign& campaign, double quantile) {
+  std::vector<FigurePlace> places;
+  for (std::size_t i = 0; i < campaign.map_names.size(); ++i)
+    places.push_back({campaign.map_names[i], &campaign.maps[i], i});
+  if (places.empty()) places.push_back({"a flat floor", &campaign.maps.front(), 0});
+  std::string text;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto figure = bound_figure(campaign.data, c.model, axis, places);
+    if (!figure) throw Failure(kUnavailable, figure.error().message);
+    text += std::string("<section><h2>Acceleration along ") + "xyz"[axis] +
+            "</h2>\n<p>Red: variance of each 2 s window. Surface: the bound at quantile " + to_text(quantile, 2) +
+            ", one set of constants for all maps.</p>\n<div class=\"scroll\">" + *figure + "</div></section>\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string calibrate_page(const Calibration& c, const Campaign& campaign, std::span<const Refusal> refused,
+                           const CalibratePageContext& context) {
+  std::string page = "<h1>Hover variances under the calibrated bound</h1>\n<p class=\"context\">" +
+                     std::to_string(campaign.windows) + " windows of " + std::to_string(campaign.logs.size()) +
+                     " flights; backwash " + report::escaped(kVersion) + "</p>\n" + verdict_of(c, context.quantile);
+  page += refusals_html(refused) + constants(c) +
+          bins(c.held_out.by_wall_distance, "distance from walls", "distance, m") +
+          bins(c.held_out.by_height, "height", "height, m") + flights(c.held_out, campaign.logs) +
+          surfaces(c, campaign, context.quantile) + left_out(campaign) +
+          report::parameters_html(own_command(), parameter_files(context.vehicle, context.base_model));
+  return report::html_page("backwash calibration", page);
+}
+
+}  // namespace backwash::services

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <optional>
+
+#include "core/study/findings/extend.hpp"
+#include "core/study/findings/residuals.hpp"
+#include "core/study/findings/study_page.hpp"
+#include "core/study/inference/rotors/rotor_reference.hpp"
+#include "services/backwash/files.hpp"
+#include "services/backwash/learn/calibrate_input.hpp"
+#include "services/backwash/learn/study_design.hpp"
+#include "services/backwash/learn/study_flights.hpp"
+#include "services/backwash/learn/study_output.hpp"
+#include "services/backwash/learn/study_rows.hpp"
+#include "services/backwash/learn/study_simulation.hpp"
+#include "services/backwash/learn/study_terms.hpp"
+#include "services/backwash/verb.hpp"
+#include "version.hpp"
+
+namespace backwash::services {
+namespace {
+
+struct StudyOptions {
+  std::string map, model = "builtin:quad-5in", vehicle, report, out;
+  std::vector<std::string> logs, reference;
+  std::string group, from;
+  unsigned seed = 1;
+  DesignOptions design;
+  bool json = false, force = false, quick = false, rules = false, residuals = false, rows = false;
+};
+
+/// What the simulation says of the flights with the model's own terms, and with those of the causes beside them.
+std::string residuals(const StudyOptions& options, const Flights& flights, const Vehicle& vehicle, const Model& model,
+                      const map::OccupancyGrid& grid, const study::Observations& measured,
+                      const std::vector<SimulationTerm>& found) {
+  FlownAgain again{{}, {}, vehicle, model, grid, options.seed};
+  for (const std::size_t k : flights.order()) {
+    again.logs.push_back(&flights.logs[k]);
+    again.paths.push_back(flights.paths[k]);
+  }
+  auto terms = read_simulation(options.model);
+  progress("simulating the flights without the causes");
+  const auto before = simulated(again, terms, measured);
+  terms.insert(terms.end(), found.begin(), found.end());
+  progress("simulating the flights with the causes");
+  const auto section = study::residual_section(measured, before, simulated(again, terms, measured));
+  if (!section) throw Failure(kUnavailable, section.error().message);
+  return *section;
+}
+
+/// An autopilot's own log numbers rotors 1 and 2 as facing ones; the verdict is about 1 and 3. Throws Failure.
+void refuse_other_numbers(const std::vector<std::string>& logs) {
+  const auto found = std::ranges::find_if(logs, is_autopilots_log);
+  if (found != logs.end())
+    throw Failure(kUsage, *found +
+                              ":1: --reference takes rotors 1 and 3 as facing each other; in this log 1 faces 2: "
+                              "import it and swap motor2 and motor3");
+}
+
+/// Flights known to be sound; nothing without such.
+std::optional<study::Observations> sound_flights(const StudyOptions& options, const Vehicle& vehicle,
+                                                 const Model& model) {
+  if (options.reference.empty()) return std::nullopt;
+  study::Observer observer(vehicle, model, nullptr);
+  for (const auto& path : options.reference) observer.add(read_studied(path));
+  return observer.finish();
+}
+
+/// Motor shares of the flights against those of the reference flights; nothing without such.
+std::optional<study::RotorVerdict> against_reference(const StudyOptions& options,
+                                                     const std::optional<study::Observations>& sound,
+                                                     const study::Observations& seen) {
+  if (!sound) return std::nullopt;
+  auto verdict = study::judge_rotors(study::rotor_contrasts(*sound), study::rotor_contrasts(seen));
+  if (!verdict)
+    throw Failure(kBadData,
+                  options.reference.front() +
+                      ":1: --reference needs 4 flights or more with motor1 … motor4, and the logs need these too");
+  return verdict;
+}
+
+/// Ratios of the vertical variance by height and plate, day and speed held fixed, of recordings that say what they
+/// stood on and under (`backwash import airgarage`).
+std::optional<study::calibrate::HeightEffects> height_effects(const StudyOptions& options, const Model& model,
+                                                              const study::Observations& seen) {
+  if (!options.map.empty() || !seen.has(study::Source::ceiling)) return std::nullopt;
+  if (!options.from.empty())
+    throw Failure(kUsage, options.from + ":1: logs with a ceiling column need a --map, or --log in place of --from");
+  return read_height_effects(options.logs, model, options.seed);
+}
+
+/// What one log at a time is asked for, and what needs more than is kept of each.
+void check_rows(const StudyOptions& options) {
+  const auto not_with = [](bool given, const std::string& option, const std::string& why) {
+    if (given) throw Failure(kUsage, option + " " + why);
+  };
+  const std::string alone = "studies nothing: give it with --vehicle, --map, --model, --group and --log alone";
+  not_with(options.rows && (options.json || options.residuals || !options.reference.empty() ||
+                            !(options.out + options.report + options.from + options.design.points).empty()),
+           "--rows", alone);
+  not_with(!options.from.empty() && !options.logs.empty(), "--from", "takes the place of --log: give one of them");
+  not_with(!options.from.empty() && options.residuals, "--residuals", "needs the logs: give --log in place of --from");
+}
+
+void check(const StudyOptions& options) {
+  if (options.vehicle.empty() || (options.logs.empty() && options.from.empty()))
+    throw Failure(kUsage, "study needs --vehicle, and --log or --from");
+  check_rows(options);
+  if (options.residuals && (options.map.empty() || options.report.empty()))
+    throw Failure(kUsage, "--residuals needs --map, to fly in, and --report, to draw on");
+  if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
+  check_design(options.design, options.map, options.force);
+  check_outputs({options.report, options.out, options.design.points}, options.force);
+}
+
+study::StudyOptions study_options(const StudyOptions& options, const std::optional<study::Observations>& sound) {
+  study::StudyOptions chosen;
+  if (sound) chosen.sound = study::sound_rotors(*sound);
+  chosen.search.seed = options.seed;
+  chosen.search.progress = [](const std::string& line) { progress(line); };
+  chosen.minimum_detectable = !options.quick;
+  return chosen;
+}
+
+void write_page(const StudyOptions& options, const study::StudyResult& result, const study::Observations& seen,
+                const study::PageContext& context) {
+  progress("drawing");
+  const auto page = study::study_page(result, seen, context);
+  if (!page) throw Failure(kUnavailable, page.error().message);
+  write_file(options.report, *page, options.force);
+}
+
+void write_model(const StudyOptions& options, const Model& model, const study::StudyResult& result,
+                 const study::Observations& seen) {
+  const auto text =
+      study::extended_model_text(model, result, seen, options.model, kVersion, earlier_terms(options.model));
+  write_file(options.out, text, options.force);
+}
+
+std::optional<study::Consequence> what_it_costs(const study::StudyResult& result, const study::Observations& seen,
+                                                const Model& model, const Vehicle& vehicle,
+                                                const map::OccupancyGrid* grid) {
+  if (result.causes.empty()) return std::nullopt;
+  progress("hover sets and a plan, before and after");
+  return study::consequence(result, seen, model, vehicle, grid, run_shown);
+}
+
+void print_beside(const Flights& flights, const std::optional<study::Design>& design, const DesignOptions& asked) {
+  for (const auto& [log, known] : flights.twice)
+    std::printf("counted once: %s is %s again\n", log.c_str(), known.c_str());
+  if (design) print_text(*design, asked);
+}
+
+void add_left_out(Json& json, const std::vector<study::ExtensionTerm>& terms, const Flights& flights) {
+  for (const auto& term : terms) json["not_applied"].push_back({{"name", term.cause}, {"form", term.formula}});
+  for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
+}
+
+Flights read_flights(const StudyOptions& options, const LookedWith& with) {
+  std::vector<StudiedFlight> studied;
+  std::vector<log::FlightLog> logs;
+  if (options.from.empty()) {
+    for (const auto& path : options.logs)
+      studied.push_back(look_at(path, options.group, with, options.residuals ? &logs : nullptr));
+  } else {
+    progress("reading " + options.from);
+    studied = read_study_rows(options.from, {options.vehicle, options.model, options.map, options.group});
+  }
+  progress("looking for flights that come twice");
+  auto flights = each_once(std::move(studied), !options.group.empty(), std::move(logs));
+  if (!options.reference.empty()) refuse_other_numbers(flights.paths);
+  return flights;
+}
+
+int print_rows(const StudyOptions& options, const LookedWith& with) {
+  for (const auto& path : options.logs) {
+    const auto row = study_row(look_at(path, options.group, with, nullptr),
+                               {options.vehicle, options.model, options.map, options.group});
+    end_progress();
+    std::fputs(row.c_str(), stdout);
+  }
+  return kOk;
+}
+
+int run(const StudyOptions& options) {
+  if (options.rules) {
+    print_rules(options.json);
+    return kOk;
+  }
+  check(options);
+  const auto vehicle = read_vehicle(options.vehicle);
+  auto model = read_model(options.model);
+  model.ground.r0 = vehicle.body.diagonal_radius;
+  const auto room = options.map.empty() ? std::nullopt : std::optional(read_map(options.map));
+  const map::OccupancyGrid* grid = room ? &*room : nullptr;
+  study::MapView surroundings(grid, model);
+  const LookedWith with{vehicle, model, grid, surroundings};
+  if (options.rows) return print_rows(options, with);
+  Flights flights = read_flights(options, with);
+  const auto sound = sound_flights(options, vehicle, model);
+  auto chosen = study_options(options, sound);
+  auto seen = observations(flights, with);
+  const auto measured = options.residuals ? seen : study::Observations{};  // nothing that the model holds taken out
+  auto terms = study::apply(read_terms(options.model), seen);
+  chosen.search.known = std::move(terms.known);
+  const auto result = study::study(seen, chosen);
+  const auto names = flights.names();
+  Json json = services::to_json(result, seen, vehicle, names);
+  add_left_out(json, terms.left, flights);
+  if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};
+  const auto height = height_effects(options, model, seen);
+  if (height) json["height_effect"] = services::to_json(*height);
+  const auto rotors = against_reference(options, sound, seen);
+  if (rotors) json["rotors_against_reference"] = services::to_json(*rotors);
+  const auto consequence = what_it_costs(result, seen, model, vehicle, grid);
+  if (consequence) json["consequence"] = services::to_json(*consequence);
+  const auto design = designed(options.design, seen, result, model, vehicle, grid, options.force);
+  if (design) json["design"] = services::to_json(*design, options.design);
+  if (!options.out.empty()) {
+    write_model(options, model, result, seen);
+    json["extended_model"] = options.out;
+  }
+  if (!options.report.empty()) {
+    std::string beside = design ? html(*design, options.design) : "";
+    if (options.residuals)
+      beside += residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen));
+    write_page(
+        options, result, seen,
+        {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, vehicle, names});
+  }
+  options.json ? print(json) : services::print_text(result, seen, vehicle, names, consequence, rotors, height);
+  if (!options.json) print_beside(flights, design, options.design);
+  return kOk;
+}
+
+}  // namespace
+
+Verb study_verb(Command& app) {
+  auto options = std::make_shared<StudyOptions>();
+  auto& command = app.add_subcommand("study", "What the simulation gets wrong, by name, with the gain");
+  command.add_option("--map", options->map,
+                     "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");
+  command.add_option("--model", options->model, "model file or builtin:NAME").capture_default_str();
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME");
+  command.add_option("logs,--log", options->logs,
+                     "flight logs, one flight each: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.mcap)");
+  command.add_flag("--rows", options->rows,
+                   "prints what a study keeps of each log as a line of JSON, and nothing else");
+  command.add_option("--from", options->from, "such lines, in order, in place of logs").type_name("FILE");
+  command.add_option(
+      "--reference", options->reference,
+      "flights of the same vehicle known to be sound, 4 or more: the --log flights' motor shares are judged against "
+      "theirs, as one condition");
+  command.add_option("--group", options->group,
+                     "column, such as day: flights with one value of it are left out, flipped and scattered together");
+  command.add_option("--report", options->report, "HTML page to write");
+  command.add_flag("--residuals", options->residuals,
+                   "on the page, per channel: what the simulation of these flights says and what was measured");
+  add_design(command, options->design);
+  command.add_option("--out", options->out, "extended model file to write");
+  command.add_option("--seed", options->seed, "of the null's sign draws").capture_default_str();
+  command.add_flag("--quick", options->quick, "without the smallest effects that could have been found");
+  command.add_flag("--rules", options->rules, "prints every constant with unit and reason, and nothing else");
+  command.add_flag("--json", options->json, "one JSON object on stdout");
+  command.add_flag("--force", options->force, "overwrite --report, --out and --design");
+  command.footer(
+      "Example:\n  backwash study --map room.bt --model builtin:quad-5in --vehicle builtin:quad-5in --log flight*.csv "
+      "--report study.html --out extended.toml");
+  return {&command, [options] {
+            keep_pages();
+            return run(*options);
+          }};
+}
+
+}  // namespace backwash::services

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/log/autopilot/same_flight.hpp"
+#include "core/log/columns/flight_log.hpp"
+#include "core/map/occupancy_grid.hpp"
+#include "core/study/windows/observation.hpp"
+#include "core/types/model.hpp"
+#include "core/types/vehicle.hpp"
+
+namespace backwash::services {
+
+/// PX4's or ArduPilot's own log, by its name.
+bool is_autopilots_log(const std::string& path);
+
+/// A flight log: ULog (.ulg) or DataFlash (.bin) by its name, else CSV. Throws Failure.
+log::FlightLog read_flight(const std::string& path);
+
+/// The same for a study, which needs positions: without the columns of sensors that never spoke. A table that no flight
+/// can be (core/log, impossible()) is refused. Throws Failure.
+log::FlightLog read_studied(const std::string& path);
+
+/// What flights are looked at with. Nothing here outlives the study.
+struct LookedWith {
+  const Vehicle& vehicle;
+  const Model& model;
+  const map::OccupancyGrid* grid;  ///< may be null
+  study::MapView& surroundings;    ///< of the two
+};
+
+/// What a study keeps of one log.
+struct StudiedFlight {
+  std::string path;
+  double group = 0;  ///< value of the column that flights are grouped by in the first row
+  log::FlightMark mark;
+  study::Observed observed;
+};
+/// Reads a log and looks at it. `group`: a column, or empty. `keep`: takes the log. Throws Failure.
+StudiedFlight look_at(const std::string& path, const std::string& group, const LookedWith& with,
+                      std::vector<log::FlightLog>* keep);
+
+/// The flights of a study, each once.
+struct Flights {
+  std::vector<std::string> paths;
+  std::vector<study::Observed> observed;
+  std::vector<double> group;                               ///< empty: none
+  std::vector<log::FlightLog> logs;                        ///< where they are kept
+  std::vector<std::pair<std::string, std::string>> twice;  ///< left out, and which flight it is again
+  /// Numbers of the flights, those of one group behind each other.
+  std::vector<std::size_t> order() const;
+  /// Their logs in this order.
+  std::vector<std::string> names() const;
+};
+
+/// To be called first. Columns of thousands of flights come and go thousands of times: the kernel need not clear their
+/// pages each time.
+void keep_pages();
+
+/// Leaves out flights that hold another one's positions, then those with another one's gusts. `logs`: of each, or
+/// empty.
+Flights each_once(std::vector<StudiedFlight> studied, bool grouped, std::vector<log::FlightLog> logs);
+/// All of them as one: takes what was observed out of `flights`.
+study::Observations observations(Flights& flights, const LookedWith& with);
+
+}  // namespace backwash::services
