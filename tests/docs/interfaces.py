@@ -111,7 +111,7 @@ def names_of_status(root: pathlib.Path) -> set[str]:
 def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> None:
     # Every name that the programs write is somewhere in the page; every name in a JSON table is written somewhere.
     named = {part for q in quoted(text) for part in re.findall(r"[A-Za-z_]\w*", q)}
-    files = [*(root / "services/backwash").glob("*.cpp"),
+    files = [*(root / "services/backwash").rglob("*.cpp"),
              *(root / name for name in ("research/compare/compare_output.cpp", "research/compare/compare_rows.cpp",
                                         "services/backwashctl/status_output.cpp", "services/backwashctl/verbs.cpp"))]
     not_output = {"flight_spec.cpp", "import.cpp", "main.cpp", "story_page.cpp"}
