@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/study/findings/extend.hpp"
 #include "core/study/findings/where_it_acts.hpp"
 #include "core/study/findings/words.hpp"
 #include "core/study/inference/coverage.hpp"
@@ -165,6 +166,8 @@ std::vector<NamedCause> in_all_flights(const Evidence& evidence, const std::vect
                      largest_flown(accepted[i], evidence.seen()),
                      check_shift(accepted[i], applied[i].beside, evidence.seen())};
     if (cause.found.form->anchor) cause.found.scale.anchor = cause.found.form->anchor(evidence.seen().windows);
+    const auto why = cause.applied.refused.empty() ? why_unwritable(cause, evidence.seen()) : std::nullopt;
+    if (why) cause.applied.refused = "no model file holds it: " + *why;
     causes.push_back(std::move(cause));
   }
   return causes;
