@@ -21,6 +21,7 @@
 #include "core/config/file_hash.hpp"
 #include "core/map/octomap/octomap_message.hpp"
 #include "core/reach/response/integrator.hpp"
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/map/map_change.hpp"
 #include "services/dds/dds.hpp"
 #include "services/parallel/parallel.hpp"
