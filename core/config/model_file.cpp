@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <optional>
 #include <sstream>
+#include <stdexcept>
 
 #include "core/config/model_table.hpp"
 #include "core/config/strict_table.hpp"
@@ -160,16 +161,35 @@ toml::table model_table(const Model& model) {
   return whole;
 }
 
-toml::table effect_table(const ModelEffect& effect) {
+std::optional<std::string> out_of_range(const std::string& what, double x, double least, double most) {
+  if (x >= least && x <= most) return std::nullopt;
+  std::ostringstream text;
+  text << what << " is " << x << ", wanted in [" << least << ", " << most << "]";
+  return text.str();
+}
+
+std::optional<std::string> why_unwritable(const ModelEffect& effect) {
   const LawEntry& law = entry(effect.kind);
-  const auto list = [&](const Vec3& v, double least) {
+  const std::string name(law.name);
+  for (std::size_t i = 0; i < law.values; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const std::string number = ": number " + std::to_string(i + 1) + " of ";
+    if (auto why = out_of_range(name + number + "value", effect.value[k], -kMost, kMost)) return why;
+    if (auto why = out_of_range(name + number + "error", effect.error[k], 0, kMost)) return why;
+  }
+  return law.scaled ? out_of_range(name + ": scale", effect.scale, kLeastScale, kMost) : std::nullopt;
+}
+
+toml::table effect_table(const ModelEffect& effect) {
+  if (const auto why = why_unwritable(effect)) throw std::invalid_argument(*why);
+  const LawEntry& law = entry(effect.kind);
+  const auto list = [&](const Vec3& v) {
     toml::array numbers;
-    for (std::size_t i = 0; i < law.values; ++i)
-      numbers.push_back(rounded(std::clamp(v[static_cast<Eigen::Index>(i)], least, kMost), 8));
+    for (std::size_t i = 0; i < law.values; ++i) numbers.push_back(rounded(v[static_cast<Eigen::Index>(i)], 8));
     return numbers;
   };
-  toml::table table{{"kind", law.name}, {"value", list(effect.value, -kMost)}, {"error", list(effect.error, 0)}};
-  if (law.scaled) table.insert("scale", rounded(std::clamp(effect.scale, kLeastScale, kMost), 8));
+  toml::table table{{"kind", law.name}, {"value", list(effect.value)}, {"error", list(effect.error)}};
+  if (law.scaled) table.insert("scale", rounded(effect.scale, 8));
   table.is_inline(true);
   return table;
 }

@@ -3,6 +3,7 @@
 
 #include <toml++/toml.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,8 +18,14 @@ double rounded(double value, int digits);
 /// [base] to [bound], six significant digits; what lies within a table is inline.
 toml::table model_table(const Model& model);
 
-/// An entry of `extension.term.effect`: { kind, value, error, scale }, eight significant digits, within what load_model
-/// accepts.
+/// "`what` is `x`, wanted in [`least`, `most`]" of a number that is not, or is none; nothing: it is.
+std::optional<std::string> out_of_range(const std::string& what, double x, double least, double most);
+
+/// Which number of an effect load_model would refuse; nothing: none.
+std::optional<std::string> why_unwritable(const ModelEffect& effect);
+
+/// An entry of `extension.term.effect`: { kind, value, error, scale }, eight significant digits. Errors: throws
+/// std::invalid_argument with why_unwritable().
 toml::table effect_table(const ModelEffect& effect);
 
 /// TOML text of the tables, each under its name, in this order; those that are not there are left out.

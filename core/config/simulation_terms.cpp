@@ -2,8 +2,8 @@
 #include "core/config/simulation_terms.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <sstream>
+#include <limits>
+#include <stdexcept>
 
 #include "core/config/model_table.hpp"
 #include "core/config/strict_table.hpp"
@@ -32,12 +32,6 @@ const std::vector<TermKind>& kinds() {
   return all;
 }
 
-std::string number(double x) {
-  std::ostringstream text;
-  text << x;
-  return text.str();
-}
-
 std::string names() {
   std::string all;
   for (const auto& k : kinds()) all += (all.empty() ? "" : ", ") + std::string(k.name);
@@ -59,15 +53,9 @@ tl::expected<SimulationTerm, std::string> read_term(const toml::node& node) {
   if (!list || list->size() != kind->value.size())
     return wrong(name + ": value needs a list of " + std::to_string(kind->value.size()));
   SimulationTerm term{kind->kind, {}};
-  for (std::size_t i = 0; i < kind->value.size(); ++i) {
-    const auto* at = list->get(i);
-    const auto x = at->is_number() ? at->value<double>() : std::nullopt;
-    const TermRange& range = kind->value[i];
-    if (!x || !(*x >= range.least) || !(*x <= range.most))
-      return wrong(name + ": number " + std::to_string(i + 1) + " of value needs to be in [" + number(range.least) +
-                   ", " + number(range.most) + "]");
-    term.value.push_back(*x);
-  }
+  for (const auto& at : *list)
+    term.value.push_back(at.is_number() ? *at.value<double>() : std::numeric_limits<double>::quiet_NaN());
+  if (auto why = why_unwritable(term)) return wrong(std::move(*why));
   return term;
 }
 
@@ -85,13 +73,25 @@ tl::expected<std::vector<SimulationTerm>, ConfigError> load_simulation(const std
   return terms;
 }
 
+std::optional<std::string> why_unwritable(const SimulationTerm& term) {
+  const auto kind = std::ranges::find(kinds(), term.kind, &TermKind::kind);
+  const std::string name(kind->name);
+  if (term.value.size() != kind->value.size())
+    return name + ": value needs a list of " + std::to_string(kind->value.size());
+  for (std::size_t i = 0; i < term.value.size(); ++i) {
+    const TermRange& range = kind->value[i];
+    if (auto why = out_of_range(name + ": number " + std::to_string(i + 1) + " of value", term.value[i], range.least,
+                                range.most))
+      return why;
+  }
+  return std::nullopt;
+}
+
 toml::table simulation_table(const SimulationTerm& term) {
+  if (const auto why = why_unwritable(term)) throw std::invalid_argument(*why);
   const auto kind = std::ranges::find(kinds(), term.kind, &TermKind::kind);
   toml::array value;
-  for (std::size_t i = 0; i < kind->value.size(); ++i) {
-    const double x = i < term.value.size() && std::isfinite(term.value[i]) ? term.value[i] : 0.0;
-    value.push_back(rounded(std::clamp(x, kind->value[i].least, kind->value[i].most), 8));
-  }
+  for (const double x : term.value) value.push_back(rounded(x, 8));
   toml::table table{{"kind", kind->name}, {"value", value}};
   table.is_inline(true);
   return table;

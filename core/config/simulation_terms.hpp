@@ -3,6 +3,7 @@
 
 #include <toml++/toml.h>
 
+#include <optional>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
@@ -18,8 +19,11 @@ namespace backwash::config {
 /// entry of an unknown kind, with an unknown key, or with other numbers than its kind has.
 tl::expected<std::vector<SimulationTerm>, ConfigError> load_simulation(const std::string& path);
 
-/// An entry of `extension.term.simulation`: { kind, value }, eight significant digits, within what load_simulation
-/// accepts.
+/// Which number of a term load_simulation would refuse; nothing: none.
+std::optional<std::string> why_unwritable(const SimulationTerm& term);
+
+/// An entry of `extension.term.simulation`: { kind, value }, eight significant digits. Errors: throws
+/// std::invalid_argument with why_unwritable().
 toml::table simulation_table(const SimulationTerm& term);
 
 }  // namespace backwash::config

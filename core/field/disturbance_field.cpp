@@ -127,24 +127,12 @@ void DisturbanceField::fill(const WholeField& whole, std::size_t begin, std::siz
   whole.evaluate(begin, end, [this](std::size_t n, const Variance& s) { set(n, s); });
 }
 
-void DisturbanceField::fill(const WholeField& whole, const map::OccupancyGrid& part, const Index3& low,
-                            std::size_t begin, std::size_t end) {
-  whole.evaluate(begin, end,
-                 [&](std::size_t n, const Variance& s) { set(map::linear(size_, low + part.voxel(n)), s); });
-}
-
 void DisturbanceField::scale(const Extension& extension, std::span<const std::size_t> voxels) {
   for (const std::size_t n : voxels) {
     if (!has(n)) continue;
     const auto factor = static_cast<float>(std::exp(extension.at(map::voxel(size_, n)).ln_variance));
     for (float& s : sigma_[slot(n)]) s *= factor;
   }
-}
-
-void DisturbanceField::scale(std::span<const AirClass> classes, const AirFactors& factors) {
-  for (std::size_t n = 0; n < classes.size(); ++n)
-    if (has(n))
-      for (float& s : sigma_[slot(n)]) s *= static_cast<float>(factor_of(factors, classes[n]));
 }
 
 void DisturbanceField::set(std::size_t n, const Variance& s) noexcept {

@@ -13,7 +13,6 @@
 #include "core/field/whole_field.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/voxel_box.hpp"
-#include "core/types/air_class.hpp"
 #include "core/types/model.hpp"
 
 namespace backwash::field {
@@ -52,7 +51,7 @@ class DisturbanceField {
   /// Room for Σ at the listed voxels (linear indices of the grid, any order), where it is unset. O(voxels of the grid).
   DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels);
   /// The same, with Σ of `old` at those listed voxels outside the box `anew` where it has one. With affected_columns()
-  /// and fill(), a field follows its map, bit for bit as if it were made anew. Precondition: of grids of one size.
+  /// and set(), a field follows its map, bit for bit as if it were made anew. Precondition: of grids of one size.
   DisturbanceField(const map::OccupancyGrid& grid, std::span<const std::size_t> voxels, const DisturbanceField& old,
                    const map::VoxelBox& anew);
 
@@ -60,15 +59,11 @@ class DisturbanceField {
   void fill(const ProximityField& exact, std::span<const std::size_t> voxels);
   /// The same for the voxels in the tiles [begin, end) of `whole`, many times faster per voxel.
   void fill(const WholeField& whole, std::size_t begin, std::size_t end);
-  /// The same where `whole` is of a part of this grid, whose voxel (0, 0, 0) is `low` here.
-  void fill(const WholeField& whole, const map::OccupancyGrid& part, const Index3& low, std::size_t begin,
-            std::size_t end);
+  /// Σ at a listed voxel, by its linear index. Distinct ones may be set from several threads at once.
+  void set(std::size_t n, const Variance& s) noexcept;
 
   /// Multiplies Σ at the given voxels, where it is stored, by the factor that an extended model has there.
   void scale(const Extension& extension, std::span<const std::size_t> voxels);
-
-  /// Multiplies Σ where it is stored by the factor of each voxel's class, of the grid's voxels in linear order.
-  void scale(std::span<const AirClass> classes, const AirFactors& factors);
 
   /// Whether Σ is stored at a voxel; false outside the grid. Real-time: wait-free, no allocation.
   bool has(const Index3& v) const noexcept;
@@ -83,7 +78,6 @@ class DisturbanceField {
  private:
   using Stored = std::array<float, 4>;  // xx, xy, yy, zz; xx < 0: not filled
   static constexpr std::size_t kWord = 64;
-  void set(std::size_t n, const Variance& s) noexcept;
   bool listed(std::size_t n) const noexcept { return listed_[n / kWord] >> n % kWord & 1; }
   std::size_t slot(std::size_t n) const noexcept;  // of a listed voxel in sigma_
   bool has(std::size_t n) const noexcept { return listed(n) && sigma_[slot(n)][0] >= 0; }

@@ -54,107 +54,113 @@ double FlightTick::sample_age(std::int64_t now_ns) const noexcept {
   return timing_.usual() ? 0 : seconds(now_ns - *last_good_ns_) + timing_.latency;
 }
 
-void FlightTick::take_segment(const TickInput& in, TickOutput& out) noexcept {
-  if (!in.segment) return;
+bool FlightTick::accepts(const TickInput& in) noexcept {
+  if (!in.segment) return false;
   // What was planned before an operator's order, or before the mode last ended it, is not flown (docs/faults.md row
   // 39). Nor is anything while the cause of a hold lasts: braked on its own stops it would creep on in that hold.
   const bool lasts = frames_apart(in) || Supervisor::silent(in.autopilot.pose_age(in.now_ns));
   const bool following = mode() == Mode::tracking || (mode() == Mode::hold && !in.segment->arms && !lasts);
-  out.accepted = following && closure_refused_ == closures_ && in.segment->epoch == epoch_ && gate_.last() &&
-                 tracker_.accept(*in.segment, gate_.last()->state, in.segment->arms ? 0 : sample_age(in.now_ns));
-  if (out.accepted) verdict_ = {};
-  out.refused = !out.accepted;
-  out.released[0] = out.accepted ? std::exchange(segment_, in.segment) : in.segment;
+  const bool accepted = following && closure_refused_ == closures_ && in.segment->epoch == epoch_ && gate_.last() &&
+                        tracker_.accept(*in.segment, gate_.last()->state, in.segment->arms ? 0 : sample_age(in.now_ns));
+  if (accepted) verdict_ = {};
+  return accepted;
 }
 
 // The set predicted for this tick against the position measured for it; what was found holds until the next sample.
-void FlightTick::judge(const TickInput& in, TickOutput& out) noexcept {
+FlightTick::Judged FlightTick::judge(const TickInput& in, bool fresh) noexcept {
   const bool on_sets = mode() == Mode::tracking || (mode() == Mode::hold && tracker_.braking());
-  if (mode() == Mode::lifting && out.fresh) verdict_.inside = tracker_.within(gate_.last()->state.p_W);
+  if (mode() == Mode::lifting && fresh) verdict_.inside = tracker_.within(gate_.last()->state.p_W);
   if (!on_sets && mode() != Mode::lifting) verdict_ = {};
-  if (!on_sets || !gate_.last()) return;
-  out.judged_segment = tracker_.segment();
-  out.judged_index = tracker_.index();
-  if (out.fresh) verdict_ = out.inside = tracker_.judge(gate_.last()->state.p_W, sample_age(in.now_ns));
+  if (!on_sets || !gate_.last()) return {};
+  if (fresh) verdict_ = tracker_.judge(gate_.last()->state.p_W, sample_age(in.now_ns));
+  return {fresh ? verdict_ : Inside{}, tracker_.segment(), tracker_.index()};
 }
 
-SupervisorInput FlightTick::facts(const TickInput& in, const TickOutput& out) noexcept {
-  SupervisorInput facts;
-  facts.request = in.request;
-  // Forgotten in this tick: there is no pose, and no place to hold, however young the last one was.
-  facts.odometry_age = gate_.last() ? odometry_age_ : std::numeric_limits<double>::infinity();
-  facts.odometry_jump = out.verdict == OdometryGate::Verdict::jump;
-  facts.odometry_inconsistent = out.verdict == OdometryGate::Verdict::inconsistent;
-  facts.odometry_frozen = out.verdict == OdometryGate::Verdict::frozen;
-  facts.odometry_disorder = disorder_ > kDisorder;
-  facts.heartbeat_age = in.autopilot.heartbeat_age;
-  facts.armed = in.autopilot.armed;
-  facts.arming = arming_ > 0;
-  facts.offboard = in.autopilot.offboard;
-  facts.frames_aligned = alignment_.aligned();
-  facts.frames_apart = frames_apart(in);
-  facts.frames_agree = alignment_.agree(2 * apart(in));
-  facts.autopilot_reset = reset_;
-  facts.closure_refused = closure_refused_now_;
-  facts.pose_age = in.autopilot.pose_age(in.now_ns);
-  facts.mismatch = alignment_.mismatch();
-  facts.inside = verdict_.inside;
-  facts.new_segment = out.accepted;
-  facts.takeoff = out.accepted && in.segment->arms;
-  facts.lifts_itself = in.autopilot.lifts_itself;
-  facts.lifted = lifted(in);
-  facts.obstacle_ahead = in.surroundings.tube_blocked;
-  facts.air_rougher = in.surroundings.rougher;
-  facts.outside_map = in.surroundings.outside;
-  facts.map_late = in.surroundings.late;
-  facts.map_missing = in.surroundings.missing;
+SupervisorInput FlightTick::facts(const TickInput& in, OdometryGate::Verdict verdict, bool accepted) noexcept {
   if (in.autopilot.battery) battery_low_ = *in.autopilot.battery < battery_land_;
-  facts.battery_low = battery_low_;
-  facts.port_open = in.autopilot.port_open;
-  facts.transmit_failed = in.autopilot.transmit_failed;
-  facts.line_slow = in.autopilot.line_slow;
-  facts.missed_periods = in.missed_periods;
-  return facts;
-}
-
-void FlightTick::drop_segment(TickOutput& out) noexcept {
-  if (const auto* dropped = std::exchange(segment_, nullptr)) out.released[out.released[0] ? 1 : 0] = dropped;
+  return {.request = in.request,
+          // Forgotten in this tick: there is no pose, and no place to hold, however young the last one was.
+          .odometry_age = gate_.last() ? odometry_age_ : std::numeric_limits<double>::infinity(),
+          .odometry_jump = verdict == OdometryGate::Verdict::jump,
+          .odometry_inconsistent = verdict == OdometryGate::Verdict::inconsistent,
+          .odometry_frozen = verdict == OdometryGate::Verdict::frozen,
+          .odometry_disorder = disorder_ > kDisorder,
+          .heartbeat_age = in.autopilot.heartbeat_age,
+          .pose_age = in.autopilot.pose_age(in.now_ns),
+          .armed = in.autopilot.armed,
+          .arming = arming_ > 0,
+          .lifts_itself = in.autopilot.lifts_itself,
+          .lifted = lifted(in),
+          .offboard = in.autopilot.offboard,
+          .frames_aligned = alignment_.aligned(),
+          .frames_apart = frames_apart(in),
+          .frames_agree = alignment_.agree(2 * apart(in)),
+          .autopilot_reset = reset_,
+          .closure_refused = closure_refused_now_,
+          .mismatch = alignment_.mismatch(),
+          .inside = verdict_.inside,
+          .new_segment = accepted,
+          .takeoff = accepted && in.segment->arms,
+          .obstacle_ahead = in.surroundings.tube_blocked,
+          .air_rougher = in.surroundings.rougher,
+          .outside_map = in.surroundings.outside,
+          .map_late = in.surroundings.late,
+          .map_missing = in.surroundings.missing,
+          .battery_low = battery_low_,
+          .port_open = in.autopilot.port_open,
+          .transmit_failed = in.autopilot.transmit_failed,
+          .line_slow = in.autopilot.line_slow,
+          .missed_periods = in.missed_periods};
 }
 
 // What the tracker does on the way into a mode.
-void FlightTick::follow(const TickInput& in, Mode before, TickOutput& out) noexcept {
-  const Mode now = out.supervisor.mode;
+bool FlightTick::follow(const TickInput& in, Mode before, bool accepted, const SupervisorOutput& reaction) noexcept {
+  const Mode now = reaction.mode;
   if (now == Mode::enabling && before != Mode::enabling && gate_.last()) {
     // A new start: hold where the vehicle is now.
     const FramePose here = pose_of(gate_.last()->state, gate_.last()->q);
     tracker_.hold_at({here.p, Vec3::Zero(), Vec3::Zero(), here.yaw});
-    drop_segment(out);
   } else if (now == Mode::hold) {
     // With a trusted pose to rest on a verified stop, unless something stands in its way or there is none.
     const bool starts = before != Mode::hold;
     const bool blocked = tracker_.braking() ? in.surroundings.tube_blocked : in.surroundings.stop_blocked;
-    const bool brakes = starts || out.accepted;  // a segment that was taken in the tick of its end
-    const bool rolls = !out.supervisor.freeze && !blocked && (brakes ? tracker_.brake() : tracker_.braking());
-    if (!rolls && (brakes || tracker_.braking() || out.supervisor.changed)) {
-      tracker_.hold_at(command_);
-      drop_segment(out);
-    }
+    const bool brakes = starts || accepted;  // a segment that was taken in the tick of its end
+    const bool rolls = !reaction.freeze && !blocked && (brakes ? tracker_.brake() : tracker_.braking());
+    if (rolls || !(brakes || tracker_.braking() || reaction.changed)) return true;
+    tracker_.hold_at(command_);
   } else if (before == Mode::lifting && now == Mode::tracking) {
     tracker_.hold_at(tracker_.at(SIZE_MAX));
-    drop_segment(out);
   } else if (now != Mode::tracking && now != Mode::lifting && before != now) {
     tracker_.hold_at(command_);
-    drop_segment(out);
+  } else {
+    return true;
   }
+  return false;
+}
+
+// A stop switch gives no number with its STOP, and where the vehicle holds for one already the mode stays.
+void FlightTick::remember(const TickInput& in, const SupervisorOutput& reaction) noexcept {
+  const Mode now = reaction.mode;
+  const bool goes_on =
+      now == Mode::tracking || now == Mode::lifting || (now == Mode::hold && reaction.reason == Reason::obstacle_ahead);
+  if ((reaction.changed && !goes_on) || in.request == Request::stop) ++epoch_.lapse;
+  was_commanding_ = commanding(now);
+  const bool fault = !supervisor_.pose_trusted() && reaction.reason != Reason::frames_disagree;
+  odometry_distrusted_ = was_commanding_ && (odometry_distrusted_ || fault);
+}
+
+Setpoint FlightTick::commanded(Mode now) noexcept {
+  if (now == Mode::lifting) return tracker_.at(lift_ticks_);
+  return was_commanding_ ? tracker_.step() : tracker_.held();
 }
 
 // The floor is where the vehicle stands disarmed, as long as it was not asked to arm: its heartbeat may tell of that a
 // second late. Higher or lower by more than the two estimates explain, or on a flight, it has left it.
-void FlightTick::watch_floor(const TickInput& in, const TickOutput& out) noexcept {
+void FlightTick::watch_floor(const TickInput& in, bool fresh) noexcept {
   left_floor_ = in.autopilot.armed && (left_floor_ || (segment_ && !segment_->arms));
   // Armed and not seen: it may be anywhere since.
   if (in.autopilot.armed && odometry_age_ > supervisor_.hold_after()) floor_.reset();
-  if (!out.fresh) return;
+  if (!fresh) return;
   const double z = gate_.last()->state.p_W.z();
   if (!in.autopilot.armed && arming_ == 0 && in.autopilot.landed.value_or(false)) floor_ = z;
   const bool off = floor_ && std::abs(z - *floor_) > apart(in);
@@ -186,11 +192,11 @@ bool FlightTick::lifted(const TickInput& in) noexcept {
 
 // The motors start for the take-off that was asked for, in the tick that accepts it, and for nothing else. A STOP on
 // the ground stops them again, unless somebody else started them; the autopilot itself refuses to disarm in the air.
-void FlightTick::ask_of_motors(const TickInput& in, Mode before, TickOutput& out) noexcept {
+FlightTick::Motors FlightTick::ask_of_motors(const TickInput& in, Mode before, bool accepted,
+                                             const SupervisorOutput& s) noexcept {
   const bool followed = before == Mode::tracking || before == Mode::hold || before == Mode::lifting;
   const bool runs = arming_ > 0 || (followed && in.autopilot.armed);
   arming_ = in.autopilot.armed ? 0 : std::max(0, arming_ - 1);
-  const auto& s = out.supervisor;
   const bool left = s.reason == Reason::operator_request || s.reason == Reason::landed;
   const bool ours = (s.mode != Mode::passive || left) && s.mode != Mode::quiet;  // neither quiet nor a pilot's
   // Motors that turn on the floor wait for the word that it stands, however late that is.
@@ -199,51 +205,56 @@ void FlightTick::ask_of_motors(const TickInput& in, Mode before, TickOutput& out
   const bool ends = in.request == Request::stop || in.request == Request::disable ||
                     (before == Mode::lifting && s.mode == Mode::land);
   if (runs && ends) abandoned_ = kArmingTicks;
-  if (out.accepted || !ours) abandoned_ = 0;
-  out.arm = out.accepted && s.mode == Mode::lifting && !in.autopilot.armed;
+  if (accepted || !ours) abandoned_ = 0;
+  Motors out;
+  out.arm = accepted && s.mode == Mode::lifting && !in.autopilot.armed;
   if (out.arm) arming_ = kArmingTicks;
   lift_ticks_ = s.mode == Mode::lifting ? lift_ticks_ + 1 : 0;
   if (lift_ticks_ > 0 && in.autopilot.lifts_itself && in.autopilot.armed && !in.autopilot.takeoff_taken &&
       lift_ticks_ % kTakeoffEvery == 2)
     out.takeoff = tracker_.at(SIZE_MAX).p_W.z() - tracker_.at(0).p_W.z();
   out.disarm = ours && abandoned_ > 0 && abandoned_ % kDisarmEvery == 0 && stands(in) && in.autopilot.armed;
+  return out;
 }
 
 TickOutput FlightTick::step(const TickInput& in) noexcept {
-  TickOutput out;
   epoch_.order = std::max(epoch_.order, in.order);
-  std::optional<OdometrySample> sample = in.odometry;
-  take_closure(sample);
-  take_odometry(in, sample, out);
-  align(in, out.fresh);
-  take_segment(in, out);
-  watch_floor(in, out);
-  judge(in, out);
+  const std::optional<OdometrySample> sample = in_frame_flown(in.odometry);
+  const Odometry odometry = believed(in, sample);
+  align(in, odometry.fresh);
+  const bool accepted = accepts(in);
+  const AcceptedSegment* const replaced = accepted ? std::exchange(segment_, in.segment) : in.segment;
+  watch_floor(in, odometry.fresh);
+  const Judged judged = judge(in, odometry.fresh);
   odometry_age_ = last_good_ns_ ? seconds(in.now_ns - *last_good_ns_) : std::numeric_limits<double>::infinity();
   const Mode before = mode();
-  out.supervisor = supervisor_.step(facts(in, out));
-  const auto& s = out.supervisor;
-  const bool goes_on = s.mode == Mode::tracking || s.mode == Mode::lifting ||
-                       (s.mode == Mode::hold && s.reason == Reason::obstacle_ahead);
-  // A stop switch gives no number with its STOP, and where the vehicle holds for one already the mode stays.
-  if ((s.changed && !goes_on) || in.request == Request::stop) ++epoch_.lapse;
-  follow(in, before, out);
-  was_commanding_ = commanding(out.supervisor.mode);
-  odometry_distrusted_ =
-      was_commanding_ &&
-      (odometry_distrusted_ || (!supervisor_.pose_trusted() && out.supervisor.reason != Reason::frames_disagree));
-  if (s.mode == Mode::lifting)
-    command_ = tracker_.at(lift_ticks_);
-  else
-    command_ = was_commanding_ ? tracker_.step() : tracker_.held();
-  out.command = command_;
-  out.command_local = alignment_.to_local(command_);
-  out.finite = finite(out.command_local);
-  out.supervisor.send_setpoint = out.supervisor.send_setpoint && out.finite;
-  out.landed = left_floor_ ? std::optional(false) : in.autopilot.landed;
-  ask_of_motors(in, before, out);
-  feed(in, out);
-  return out;
+  SupervisorOutput reaction = supervisor_.step(facts(in, odometry.verdict, accepted));
+  const bool goes_on = follow(in, before, accepted, reaction);
+  const AcceptedSegment* const dropped = goes_on ? nullptr : std::exchange(segment_, nullptr);
+  remember(in, reaction);
+  command_ = commanded(reaction.mode);
+  const Setpoint local = alignment_.to_local(command_);
+  const bool sendable = finite(local);
+  reaction.send_setpoint = reaction.send_setpoint && sendable;
+  const Motors motors = ask_of_motors(in, before, accepted, reaction);
+  return {.supervisor = reaction,
+          .command = command_,
+          .command_local = local,
+          .finite = sendable,
+          .verdict = odometry.verdict,
+          .fresh = odometry.fresh,
+          .arm = motors.arm,
+          .disarm = motors.disarm,
+          .landed = left_floor_ ? std::optional(false) : in.autopilot.landed,
+          .takeoff = motors.takeoff,
+          .forward_odometry = feeds(in, odometry.fresh, reaction.mode),
+          .odometry_resets = odometry_resets_,
+          .inside = judged.inside,
+          .judged_segment = judged.segment,
+          .judged_index = judged.index,
+          .accepted = accepted,
+          .refused = in.segment && !accepted,
+          .released = {replaced ? replaced : dropped, replaced ? dropped : nullptr}};
 }
 
 // What a tick believes of poses: loop closures, odometry, and the controller's frame against the map's.
@@ -260,11 +271,11 @@ double AutopilotFacts::pose_age(std::int64_t now_ns) const noexcept {
 // within this tick, so that in the controller's frame, and physically, nothing has moved; the planner then brings the
 // flight back to its place in the map (rectified()). One that is absurd is not flown: the samples are brought back into
 // the frame that is flown in, until the vehicle is in other hands.
-void FlightTick::take_closure(std::optional<OdometrySample>& sample) noexcept {
+std::optional<OdometrySample> FlightTick::in_frame_flown(std::optional<OdometrySample> sample) noexcept {
   closure_refused_now_ = false;
   const double faded = was_commanding_ ? 1 - kControlPeriod / kClosureFades : 0;
   closed_m_ *= faded, closed_rad_ *= faded;
-  if (!sample || sample->closures == closures_) return;
+  if (!sample || sample->closures == closures_) return sample;
   const RigidShift D = sample->map_from_odom * map_from_odom_.inverse();
   const bool first = closures_ == 0;
   const OdometrySample before = moved(D.inverse(), *sample);
@@ -278,46 +289,46 @@ void FlightTick::take_closure(std::optional<OdometrySample>& sample) noexcept {
     sample = before;
     sample->closures = closures_;
     sample->map_from_odom = map_from_odom_;
-    return;
+    return sample;
   }
   closure_refused_ = closures_ = sample->closures;
   map_from_odom_ = sample->map_from_odom;
-  if (first) return tracker_.rebase({}, closures_);  // until now nothing was in the map by way of it
+  if (first) {  // until now nothing was in the map by way of it
+    tracker_.rebase({}, closures_);
+    return sample;
+  }
   gate_.rebase(D);
   alignment_.rebase(D);
   tracker_.rebase(D, closures_);
   if (floor_) *floor_ += D.t.z();
   command_ = D.setpoint(command_);
+  return sample;
 }
 
-void FlightTick::take_odometry(const TickInput& in, const std::optional<OdometrySample>& sample,
-                               TickOutput& out) noexcept {
-  if (!sample) return;
+FlightTick::Odometry FlightTick::believed(const TickInput& in, const std::optional<OdometrySample>& sample) noexcept {
+  if (!sample) return {};
   // After a jump or a gap a sample that looks good again may still be in another place: it is not believed, and not
   // forwarded, until the vehicle is in other hands.
-  if (odometry_distrusted_) {
-    out.verdict = OdometryGate::Verdict::rejected;
-    return;
-  }
+  if (odometry_distrusted_) return {.verdict = OdometryGate::Verdict::rejected};
   using Verdict = OdometryGate::Verdict;
   // A pose that repeats to the last bit is frozen in the air even if nothing is to move; standing, it may be still.
   const bool flies = in.autopilot.armed && (left_floor_ || in.autopilot.landed == false);
   const bool lifts = mode() == Mode::lifting;
   off_ground_ = lifts && flies ? off_ground_ + 1 : 0;
   const bool moving = lifts ? off_ground_ > kLeavesGround : command_.v_W.norm() > 0.05 || flies;
-  out.verdict = gate_.take(*sample, moving);
-  disorder_ = out.verdict == Verdict::disorder ? std::min(disorder_ + 1, kDisorder + 1) : 0;
-  if (out.verdict == Verdict::good) {
-    last_good_ns_ = std::min(sample->received_ns, in.now_ns) - nanoseconds(gate_.late());
-    out.fresh = true;
+  const Verdict verdict = gate_.take(*sample, moving);
+  const bool fresh = verdict == Verdict::good;
+  disorder_ = verdict == Verdict::disorder ? std::min(disorder_ + 1, kDisorder + 1) : 0;
+  if (fresh) last_good_ns_ = std::min(sample->received_ns, in.now_ns) - nanoseconds(gate_.late());
+  const bool other = verdict == Verdict::jump || verdict == Verdict::inconsistent;
+  const bool elsewhere =
+      other || disorder_ > kDisorder || (fresh && seconds(in.now_ns - *last_good_ns_) > supervisor_.hold_after());
+  if (elsewhere && !was_commanding_) {
+    gate_.forget();
+    floor_.reset();
+    if (other) ++odometry_resets_;
   }
-  const bool elsewhere = out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent ||
-                         disorder_ > kDisorder ||
-                         (out.fresh && seconds(in.now_ns - *last_good_ns_) > supervisor_.hold_after());
-  if (!elsewhere || was_commanding_) return;
-  gate_.forget();
-  floor_.reset();
-  if (out.verdict == Verdict::jump || out.verdict == Verdict::inconsistent) ++odometry_resets_;
+  return {verdict, fresh};
 }
 
 // Learns local ← map while nothing is commanded, watches it otherwise. Takes it anew when the controller's estimator
@@ -375,12 +386,11 @@ bool FlightTick::frames_apart(const TickInput& in) const noexcept { return align
 // Odometry is a sensor of the autopilot's, not a command: it gets every good sample in every mode, so that its
 // estimator stays right under a pilot's hands and after us. What we have stopped to believe in flight is not forwarded
 // until the vehicle stands or follows us again.
-void FlightTick::feed(const TickInput& in, TickOutput& out) noexcept {
-  const bool again = !in.autopilot.armed || out.supervisor.mode == Mode::tracking;
+bool FlightTick::feeds(const TickInput& in, bool fresh, Mode now) noexcept {
+  const bool again = !in.autopilot.armed || now == Mode::tracking;
   const bool distrusted = odometry_distrusted_ || (was_commanding_ && !supervisor_.pose_trusted());
   feed_distrusted_ = distrusted || (feed_distrusted_ && !again);
-  out.forward_odometry = out.fresh && !feed_distrusted_;
-  out.odometry_resets = odometry_resets_;
+  return fresh && !feed_distrusted_;
 }
 
 }  // namespace backwash::track

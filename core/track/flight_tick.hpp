@@ -119,19 +119,34 @@ class FlightTick {
   const Epoch& epoch() const noexcept { return epoch_; }
 
  private:
-  void take_closure(std::optional<OdometrySample>& sample) noexcept;
-  void take_odometry(const TickInput& in, const std::optional<OdometrySample>& sample, TickOutput& out) noexcept;
+  struct Odometry {
+    OdometryGate::Verdict verdict = OdometryGate::Verdict::good;
+    bool fresh = false;
+  };
+  struct Judged {
+    Inside inside{};
+    std::uint64_t segment = 0, index = 0;
+  };
+  struct Motors {
+    bool arm = false, disarm = false;
+    std::optional<double> takeoff;  // m
+  };
+
+  std::optional<OdometrySample> in_frame_flown(std::optional<OdometrySample> sample) noexcept;
+  Odometry believed(const TickInput& in, const std::optional<OdometrySample>& sample) noexcept;
   void align(const TickInput& in, bool fresh) noexcept;
-  void watch_floor(const TickInput& in, const TickOutput& out) noexcept;
-  void take_segment(const TickInput& in, TickOutput& out) noexcept;
-  void judge(const TickInput& in, TickOutput& out) noexcept;
-  SupervisorInput facts(const TickInput& in, const TickOutput& out) noexcept;
-  void follow(const TickInput& in, Mode before, TickOutput& out) noexcept;
-  void ask_of_motors(const TickInput& in, Mode before, TickOutput& out) noexcept;
+  bool accepts(const TickInput& in) noexcept;
+  void watch_floor(const TickInput& in, bool fresh) noexcept;
+  Judged judge(const TickInput& in, bool fresh) noexcept;
+  SupervisorInput facts(const TickInput& in, OdometryGate::Verdict verdict, bool accepted) noexcept;
+  /// Whether the segment stays the tracker's.
+  bool follow(const TickInput& in, Mode before, bool accepted, const SupervisorOutput& reaction) noexcept;
+  void remember(const TickInput& in, const SupervisorOutput& reaction) noexcept;
+  Setpoint commanded(Mode now) noexcept;
+  Motors ask_of_motors(const TickInput& in, Mode before, bool accepted, const SupervisorOutput& s) noexcept;
   bool stands(const TickInput& in) const noexcept;
   bool lifted(const TickInput& in) noexcept;
-  void feed(const TickInput& in, TickOutput& out) noexcept;
-  void drop_segment(TickOutput& out) noexcept;
+  bool feeds(const TickInput& in, bool fresh, Mode now) noexcept;
 
   double sample_age(std::int64_t now_ns) const noexcept;
   void remember_tilt(const AutopilotFacts::Pose& pose, const Vec3& up_B) noexcept;

@@ -156,12 +156,15 @@ RouteOutcome measure(const Route& route, const plan::World& world, const Vehicle
   return outcome;
 }
 
-SceneComparison compare_scene(const std::string& scene, plan::World world, const std::vector<RoutePair>& pairs,
-                              const std::vector<CompareMethod>& methods, const Parallel& parallel) {
-  const Vehicle vehicle = world.reach.vehicle;
+SceneComparison compare_scene(const std::string& scene, const plan::World& as_built,
+                              const std::vector<RoutePair>& pairs, const std::vector<CompareMethod>& methods,
+                              const Parallel& parallel) {
+  const Vehicle& vehicle = as_built.reach.vehicle;
   SceneComparison comparison{scene, vehicle.name, pairs, {}};
   for (const auto& method : methods) {
-    world = plan::with_clearance_by(std::move(world), method.sets, method.margin, parallel);
+    const auto built = plan::rebuilt(
+        as_built, {.clearance = plan::Clearance{plan::sets_of(vehicle, method.sets), method.margin}}, parallel);
+    const plan::World& world = *built;
     auto& outcomes = comparison.outcomes.emplace_back(pairs.size());
     parallel(pairs.size(), [&](std::size_t begin, std::size_t end) {
       for (std::size_t n = begin; n < end; ++n)

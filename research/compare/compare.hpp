@@ -68,8 +68,9 @@ struct SceneComparison {
 };
 /// Flies every pair with every method. `world` holds the scene and the vehicle; its clearance is replaced by each
 /// method's in turn. `parallel` runs over the pairs; the result does not depend on it, but for planning_ms.
-SceneComparison compare_scene(const std::string& scene, plan::World world, const std::vector<RoutePair>& pairs,
-                              const std::vector<CompareMethod>& methods, const Parallel& parallel = run_serial);
+SceneComparison compare_scene(const std::string& scene, const plan::World& as_built,
+                              const std::vector<RoutePair>& pairs, const std::vector<CompareMethod>& methods,
+                              const Parallel& parallel = run_serial);
 
 /// The narrow gap of the paper's figures, flown again and again in other air.
 struct GapCampaign {

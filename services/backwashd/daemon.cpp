@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "core/config/file_hash.hpp"
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/control/control_loop.hpp"
 #include "services/backwashd/control/link_watch.hpp"
 #include "services/backwashd/in/dds_front.hpp"

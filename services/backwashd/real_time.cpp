@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/control/control_loop.hpp"
 #include "services/parallel/real_time.hpp"
 

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdio>
 #include <string>
 #include <string_view>
 
 namespace backwash::daemon {
+
+/// One line for the operator.
+using Line = std::array<char, 192>;
 
 /// What another process sent, fit for a log line, an answer or a terminal: at most `most` of its bytes, the rest as
 /// "…"; bytes that are no printable ASCII as \xNN, the backslash too, so that nothing passes for another line, an

@@ -126,7 +126,7 @@ void by_region(benchmark::State& state) {
       plan::build_world(map_of(state.range(1)), kModel, kVehicle, reach::Method::tight, std::nullopt, run_parallel);
   const Change change = change_of(*old);
   for (auto _ : state)
-    benchmark::DoNotOptimize(plan::update_world(*old, change.grid, change.box, kModel, threads(state)));
+    benchmark::DoNotOptimize(plan::rebuilt(*old, {.grid = change.grid, .voxels = change.box}, threads(state)));
 }
 BENCHMARK(by_region)
     ->ArgNames({"threads", "map"})

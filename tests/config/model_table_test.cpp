@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
+#include <stdexcept>
 
 #include "core/config/config.hpp"
 
@@ -94,13 +97,20 @@ TEST(ModelTable, EveryKindOfEffectIsReadBackAsItWasWritten) {
   }
 }
 
-// What a study found may lie beyond what a file may hold; the file is readable all the same.
-TEST(ModelTable, NumbersOfAnEffectBeyondTheReadersRangeAreWrittenAtItsEnd) {
-  const auto found = extended({Law::push_to_walls, Vec3(-80, 0, 0), Vec3(70, 0, 0), 1e-4});
-  ASSERT_TRUE(found) << found.error().message;
-  EXPECT_EQ(found->extension.at(0).value.x(), -10);
-  EXPECT_EQ(found->extension.at(0).error.x(), 10);
-  EXPECT_EQ(found->extension.at(0).scale, 0.01);
+// What a study found may lie beyond what a file may hold: it is not written as another number.
+TEST(ModelTable, ANumberOfAnEffectBeyondTheReadersRangeOrNoneIsRefusedByItsName) {
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  const ModelEffect sound{Law::push_to_walls, Vec3(1, 0, 0), Vec3(1, 0, 0), 0.1};
+  ASSERT_EQ(why_unwritable(sound), std::nullopt);
+  for (const auto& [x, error, scale, said] :
+       {std::tuple{-80.0, 1.0, 0.1, "push_to_walls: number 1 of value is -80, wanted in [-10, 10]"},
+        {NAN, 1.0, 0.1, "push_to_walls: number 1 of value is nan, wanted in [-10, 10]"},
+        {1.0, kInfinite, 0.1, "push_to_walls: number 1 of error is inf, wanted in [0, 10]"},
+        {1.0, 1.0, 1e-4, "push_to_walls: scale is 0.0001, wanted in [0.01, 10]"}}) {
+    const ModelEffect effect{Law::push_to_walls, Vec3(x, 0, 0), Vec3(error, 0, 0), scale};
+    EXPECT_EQ(why_unwritable(effect), said);
+    EXPECT_THROW(effect_table(effect), std::invalid_argument);
+  }
 }
 
 TEST(ModelTable, AnyTextIsReadable) {

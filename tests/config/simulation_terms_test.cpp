@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 
 #include "core/config/model_table.hpp"
 
@@ -34,13 +36,27 @@ TEST(SimulationTerms, EveryKindIsReadBackAsItWasWritten) {
   for (const LawEntry& law : kLaws) kinds.emplace_back(law.law);
   for (const SimulationKind& own : kSimulationKinds) kinds.emplace_back(own.kind);
   for (const auto& kind : kinds) {
-    const auto table = simulation_table({kind, std::vector<double>(8, 0.25)});
+    std::vector<double> value{0.25};
+    while (why_unwritable({kind, value}) && value.size() < 9) value.push_back(0.25);
+    const auto table = simulation_table({kind, value});
     const auto found = terms_in(with(table));
     ASSERT_TRUE(found) << table["kind"] << ": " << found.error().message;
     ASSERT_EQ(found->size(), 1u) << table["kind"];
     EXPECT_EQ(found->front().kind, kind);
     EXPECT_EQ(simulation_table(found->front()), table) << table["kind"];
   }
+}
+
+// A fitted number is not written as another one, and none is not written as 0.
+TEST(SimulationTerms, ANumberBeyondTheReadersRangeOrNoneIsRefusedByItsName) {
+  for (const auto& [x, said] : {std::pair{7.0, "thrust_lag: number 1 of value is 7, wanted in [0, 1]"},
+                                {-1e-9, "thrust_lag: number 1 of value is -1e-09, wanted in [0, 1]"},
+                                {NAN, "thrust_lag: number 1 of value is nan, wanted in [0, 1]"}}) {
+    const SimulationTerm term{SimulationTerm::Kind::thrust_lag, {x}};
+    EXPECT_EQ(why_unwritable(term), said);
+    EXPECT_THROW(simulation_table(term), std::invalid_argument);
+  }
+  EXPECT_EQ(why_unwritable({SimulationTerm::Kind::thrust_lag, {}}), "thrust_lag: value needs a list of 1");
 }
 
 TEST(SimulationTerms, ThereAreNoneInAPlainModel) { EXPECT_TRUE(load_simulation("builtin:quad-5in")->empty()); }

@@ -41,7 +41,7 @@ std::size_t counted(const World& world, AirClass air) {
 }
 
 TEST(AirScale, TheClassOfAVoxelIsTheTermThatIsLargestInTheExactModel) {
-  const auto world = with_air(*as_modelled(), kModelledAir, Model{});
+  const auto world = rebuilt(*as_modelled(), {.air = kModelledAir});
   const field::ProximityField exact(world->grid, with_vehicle(Model{}, quad()));
   std::size_t compared = 0, close = 0;
   for (std::size_t n = 0; n < world->grid.cell_count(); n += 3) {
@@ -69,7 +69,7 @@ TEST(AirScale, ABoundGrowsByTheRootOfItsClasssFactorAndTheSteadyPushDoesNot) {
   model.bound.mean_horizontal = 0.05;
   model.bound.mean_vertical = 0.02;
   const auto calm = build_world(furnished(), model, quad());
-  const auto rough = with_air(*calm, kRougher, model);
+  const auto rough = rebuilt(*calm, {.air = kRougher});
   const field::DisturbanceField modelled = test::stored_field(*calm, model);
   std::size_t grown = 0;
   for (std::size_t n = 0; n < calm->grid.cell_count(); ++n) {
@@ -91,7 +91,7 @@ TEST(AirScale, ABoundGrowsByTheRootOfItsClasssFactorAndTheSteadyPushDoesNot) {
 
 TEST(AirScale, RougherAirTakesPlacesToHoverAwayAndWidensTheSetsThere) {
   const auto calm = as_modelled();
-  const auto rough = with_air(*calm, {4, 4, 4, 4, 1}, Model{});
+  const auto rough = rebuilt(*calm, {.air = AirFactors{4, 4, 4, 4, 1}});
   std::size_t lost = 0;
   for (std::size_t n = 0; n < calm->grid.cell_count(); ++n)
     lost += calm->hover.safe(calm->grid.voxel(n)) && !rough->hover.safe(rough->grid.voxel(n));
@@ -105,7 +105,7 @@ TEST(AirScale, RougherAirTakesPlacesToHoverAwayAndWidensTheSetsThere) {
 }
 
 TEST(AirScale, AirAsModelledChangesNothing) {
-  const auto world = with_air(*as_modelled(), kModelledAir, Model{});
+  const auto world = rebuilt(*as_modelled(), {.air = kModelledAir});
   for (std::size_t n = 0; n < world->grid.cell_count(); ++n) {
     const Index3 v = world->grid.voxel(n);
     EXPECT_EQ(world->bounds.at(v).w, as_modelled()->bounds.at(v).w);
@@ -114,15 +114,15 @@ TEST(AirScale, AirAsModelledChangesNothing) {
 }
 
 TEST(AirScale, WhatWasLearntWithoutAClassCountsForAll) {
-  const auto all = with_air(*as_modelled(), {4, 4, 4, 4, 1}, Model{});
-  const auto none = with_air(*as_modelled(), {1, 1, 1, 1, 4}, Model{});
+  const auto all = rebuilt(*as_modelled(), {.air = AirFactors{4, 4, 4, 4, 1}});
+  const auto none = rebuilt(*as_modelled(), {.air = AirFactors{1, 1, 1, 1, 4}});
   for (std::size_t n = 0; n < all->grid.cell_count(); ++n)
     EXPECT_EQ(none->bounds.at(none->grid.voxel(n)).w, all->bounds.at(all->grid.voxel(n)).w);
 }
 
 // A scan in rough air must not bring the model's bounds back.
 TEST(AirScale, AChangedMapKeepsFactorsAndClassesAsIfItHadBeenBuiltWithThem) {
-  const auto old = with_air(*as_modelled(), kRougher, Model{});
+  const auto old = rebuilt(*as_modelled(), {.air = kRougher});
   map::OccupancyGrid grid = old->grid;
   map::VoxelBox changed;
   for (const Vec3& p : {Vec3(0.9, 0.9, 0.5), Vec3(1.1, 1.1, 1.1)}) {
@@ -131,8 +131,8 @@ TEST(AirScale, AChangedMapKeepsFactorsAndClassesAsIfItHadBeenBuiltWithThem) {
     grid.set(v, map::Cell::occupied);
     changed.add(v);
   }
-  const auto updated = update_world(*old, grid, changed, Model{});
-  const auto whole = with_air(*build_world(grid, Model{}, quad()), kRougher, Model{});
+  const auto updated = rebuilt(*old, {.grid = grid, .voxels = changed});
+  const auto whole = rebuilt(*build_world(grid, Model{}, quad()), {.air = kRougher});
   EXPECT_EQ(updated->air.factors, kRougher);
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     const Index3 v = grid.voxel(n);
@@ -145,7 +145,7 @@ TEST(AirScale, AChangedMapKeepsFactorsAndClassesAsIfItHadBeenBuiltWithThem) {
 }
 
 TEST(AirScale, APlaceHasTheModelsVarianceAndNoneBeyondTheMap) {
-  const auto world = with_air(*as_modelled(), kRougher, Model{});
+  const auto world = rebuilt(*as_modelled(), {.air = kRougher});
   const Vec3 p = world->grid.center(world->grid.index({-2, 0, 1.2}));
   const AirPlace here = air_at(world->air, world->grid, p);
   const Variance expected = test::stored_field(*as_modelled(), Model{}).at(world->grid.index(p));
@@ -161,8 +161,8 @@ TEST(AirScale, APlaceHasTheModelsVarianceAndNoneBeyondTheMap) {
 // What is taken over from the world before must not show: its places to hover, while factors grow, and no more after a
 // reset.
 TEST(AirScale, TheWorldDependsOnTheFactorsAndNotOnThoseBefore) {
-  const auto at_once = with_air(*as_modelled(), {4, 4, 4, 4, 1}, Model{});
-  const auto half_way = with_air(*as_modelled(), {2, 1, 4, 1, 1}, Model{});
+  const auto at_once = rebuilt(*as_modelled(), {.air = AirFactors{4, 4, 4, 4, 1}});
+  const auto half_way = rebuilt(*as_modelled(), {.air = AirFactors{2, 1, 4, 1, 1}});
   const auto equal = [](const World& a, const World& b) {
     std::size_t differ = 0;
     for (std::size_t n = 0; n < a.grid.cell_count(); ++n) {
@@ -172,9 +172,9 @@ TEST(AirScale, TheWorldDependsOnTheFactorsAndNotOnThoseBefore) {
     return differ == 0;
   };
   EXPECT_FALSE(equal(*half_way, *at_once));
-  EXPECT_TRUE(equal(*with_air(*half_way, {4, 4, 4, 4, 1}, Model{}), *at_once)) << "grown in two steps";
-  EXPECT_TRUE(equal(*with_air(*at_once, {2, 1, 4, 1, 1}, Model{}), *half_way)) << "some fell";
-  EXPECT_TRUE(equal(*with_air(*at_once, kModelledAir, Model{}), *as_modelled())) << "a reset";
+  EXPECT_TRUE(equal(*rebuilt(*half_way, {.air = AirFactors{4, 4, 4, 4, 1}}), *at_once)) << "grown in two steps";
+  EXPECT_TRUE(equal(*rebuilt(*at_once, {.air = AirFactors{2, 1, 4, 1, 1}}), *half_way)) << "some fell";
+  EXPECT_TRUE(equal(*rebuilt(*at_once, {.air = kModelledAir}), *as_modelled())) << "a reset";
 }
 
 /// Everything of a world in this air by the long way: Σ scaled as a field, w̄ of all places, each hover set by itself.
@@ -183,7 +183,15 @@ void expect_made_anew(const World& world, const World& modelled, const AirFactor
   scale.factors = factors;
   EXPECT_EQ(world.air.factors, factors);
   EXPECT_EQ(world.air.classes, modelled.air.classes);
-  const reach::BoundField bounds(modelled.grid, scale.flown(), Model{}.bound);
+  field::DisturbanceField flown = *scale.sigma;
+  for (std::size_t n = 0; n < modelled.grid.cell_count(); ++n) {
+    if (!flown.has(modelled.grid.voxel(n))) continue;
+    const Variance s = flown.at(n);
+    const auto factor = static_cast<float>(factor_of(factors, scale.classes[n]));
+    const auto single = [factor](double of_s) { return factor * static_cast<float>(of_s); };
+    flown.set(n, {single(s.xx), single(s.xy), 0, single(s.yy), 0, single(s.zz)});
+  }
+  const reach::BoundField bounds(modelled.grid, flown, Model{}.bound);
   EXPECT_EQ(world.bounds.largest().w, bounds.largest().w);
   map::OccupancyGrid safe(modelled.grid.origin(), modelled.grid.resolution(), modelled.grid.size(), map::Cell::unknown);
   for (std::size_t n = 0; n < modelled.grid.cell_count(); ++n) {
@@ -212,7 +220,7 @@ TEST(AirScale, AChangeOfFactorsGivesBitForBitWhatAllMadeAnewGives) {
   const auto in_pieces = [](std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
     for (std::size_t n = 0; n < count; n += 7) work(n, std::min(n + 7, count));
   };
-  const auto modelled = with_air(*as_modelled(), kModelledAir, Model{});
+  const auto modelled = rebuilt(*as_modelled(), {.air = kModelledAir});
   auto world = modelled;
   const AirFactors steps[] = {{1, 1.1892, 1, 1, 1},
                               {1, 1.1892, 2.3784, 1, 1},
@@ -220,7 +228,7 @@ TEST(AirScale, AChangeOfFactorsGivesBitForBitWhatAllMadeAnewGives) {
                               {1, 1, 1, 1, 2.8284},
                               {8, 8, 8, 8, 8}};
   for (const AirFactors& factors : steps) {
-    world = with_air(*world, factors, Model{}, factors[0] > 1 ? Parallel(in_pieces) : Parallel(run_serial));
+    world = rebuilt(*world, {.air = factors}, factors[0] > 1 ? Parallel(in_pieces) : Parallel(run_serial));
     expect_made_anew(*world, *modelled, factors);
   }
 }

@@ -23,7 +23,8 @@ TEST(World, WithAnIntegratorUpdatedByRegionIsTheWorldBuiltAnew) {
         changed.add(v);
       }
   const auto before = build_world(hall, Model{}, vehicle), anew = build_world(grid, Model{}, vehicle);
-  const auto there = update_world(*before, grid, changed, Model{}), back = update_world(*there, hall, changed, Model{});
+  const auto there = rebuilt(*before, {.grid = grid, .voxels = changed}),
+             back = rebuilt(*there, {.grid = hall, .voxels = changed});
   int far = 0, safe = 0;
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     const Index3 v = grid.voxel(n);

@@ -117,7 +117,7 @@ TEST(MemoryOfAWorld, TwoOfABuildingInWhichACubicMetreChangedShareMostOfOne) {
   const int edge = static_cast<int>(1 / grid.resolution());
   map::VoxelBox changed{low, (low + Index3::Constant(edge - 1)).cwiseMin(grid.size() - Index3::Ones())};
   map::for_each_voxel(changed, [&](const Index3& v) { grid.set(v, map::Cell::occupied); });
-  const auto updated = update_world(*world, std::move(grid), changed, model);
+  const auto updated = rebuilt(*world, {.grid = std::move(grid), .voxels = changed});
   const double growth = static_cast<double>(held - one) / static_cast<double>(one - none);
   std::printf("a cubic metre: %.3f of the world more\n", growth);
   EXPECT_LT(growth, 0.3);

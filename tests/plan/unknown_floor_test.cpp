@@ -43,7 +43,7 @@ TEST(UnknownFloor, AWorldUpdatedByRegionIsTheWorldBuiltAnew) {
     std::mt19937 random(rougher ? 2 : 1);
     const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
     const auto in_air = [&](std::shared_ptr<const World> world) {
-      return rougher ? with_air(*world, kFloorRougher, model) : world;
+      return rougher ? rebuilt(*world, {.air = kFloorRougher}) : world;
     };
     OccupancyGrid grid(Vec3::Zero(), 0.2, Index3(36, 30, 14), Cell::free);
     for (int n = 0; n < 36 * 30; ++n) grid.set({n % 36, n / 36, 0}, static_cast<Cell>(below(3)));
@@ -59,7 +59,7 @@ TEST(UnknownFloor, AWorldUpdatedByRegionIsTheWorldBuiltAnew) {
         grid.set(v, cell);
         changed.add(v);
       }
-      const auto before = std::exchange(world, update_world(*world, grid, changed, model));
+      const auto before = std::exchange(world, rebuilt(*world, {.grid = grid, .voxels = changed}));
       const auto anew = in_air(build_world(grid, model, quad_5in()));
       expect_same_world(*world, *anew);
       if (HasFatalFailure()) return;
@@ -78,7 +78,7 @@ TEST(UnknownFloor, BelowTheLowestLayerOfAMapAFloorMayBeAsWell) {
   for (const bool rougher : {false, true}) {
     const auto made = [&](const OccupancyGrid& grid, const Model& model) {
       auto world = build_world(grid, model, quad_5in());
-      return rougher ? with_air(*world, kFloorRougher, model) : world;
+      return rougher ? rebuilt(*world, {.air = kFloorRougher}) : world;
     };
     const auto of_cut = made(cut, floor_model()), of_whole = made(whole, floor_model()), without = made(cut, Model{});
     for (std::size_t n = 0; n < cut.cell_count(); ++n) {
@@ -100,7 +100,7 @@ TEST(UnknownFloor, InLearntAirIsTheGroundThatAKnownOneIs) {
     unknown.set({n % 30, n / 30, 0}, Cell::unknown);
   }
   const auto learnt = [](const OccupancyGrid& grid) {
-    return with_air(*build_world(grid, floor_model(), quad_5in()), {1, 2, 1, 1, 1}, floor_model());
+    return rebuilt(*build_world(grid, floor_model(), quad_5in()), {.air = AirFactors{1, 2, 1, 1, 1}});
   };
   const auto over_known = learnt(known), over_unknown = learnt(unknown);
   std::size_t ground = 0;

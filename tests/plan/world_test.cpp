@@ -92,7 +92,10 @@ TEST(World, RestoredIsTheOneThatWasBuilt) {
   for (const auto& [model, method, margin] : cases) {
     const auto built = build_world(corridor(), model, vehicle_5in(), method, margin);
     const std::string kept = kept_of(*built);
-    const auto restored = restored_world(corridor(), model, vehicle_5in(), method, margin, kept);
+    const auto restore = [&](std::string_view bytes) {
+      return rebuilt(unbuilt_world(corridor(), model, vehicle_5in(), method, margin), {.kept = bytes});
+    };
+    const auto restored = restore(kept);
     ASSERT_TRUE(restored);
     std::size_t safe = 0;
     for (std::size_t n = 0; n < built->grid.cell_count(); ++n) {
@@ -112,8 +115,8 @@ TEST(World, RestoredIsTheOneThatWasBuilt) {
     EXPECT_GT(safe, 10u);
     EXPECT_EQ(restored->constant_margin, margin);
     EXPECT_EQ(restored->reach.loop, built->reach.loop);
-    EXPECT_FALSE(restored_world(corridor(), model, vehicle_5in(), method, margin, kept.substr(1)));
-    EXPECT_FALSE(restored_world(corridor(), model, vehicle_5in(), method, margin, ""));
+    EXPECT_FALSE(restore(std::string_view(kept).substr(1)));
+    EXPECT_FALSE(restore(""));
   }
 }
 
@@ -146,15 +149,15 @@ TEST(World, WithAnotherClearanceIsTheWorldBuiltForIt) {
   } others[] = {{reach::Method::paper, std::nullopt}, {reach::Method::tight, 0.3}};
   for (const auto& [method, margin] : others) {
     const auto built = build_world(corridor(), Model{}, vehicle_5in(), method, margin);
-    const World changed = with_clearance_by(*tight, method, margin);
-    EXPECT_EQ(changed.reach.method, built->reach.method);
-    EXPECT_EQ(changed.reach.loop, built->reach.loop);
-    EXPECT_EQ(changed.constant_margin, margin);
+    const auto changed = rebuilt(*tight, {.clearance = Clearance{sets_of(vehicle_5in(), method), margin}});
+    EXPECT_EQ(changed->reach.method, built->reach.method);
+    EXPECT_EQ(changed->reach.loop, built->reach.loop);
+    EXPECT_EQ(changed->constant_margin, margin);
     std::size_t different = 0;
     for (std::size_t n = 0; n < built->grid.cell_count(); ++n) {
       const Index3 v = built->grid.voxel(n);
-      ASSERT_EQ(changed.hover.safe(v), built->hover.safe(v));
-      different += changed.hover.safe(v) != tight->hover.safe(v);
+      ASSERT_EQ(changed->hover.safe(v), built->hover.safe(v));
+      different += changed->hover.safe(v) != tight->hover.safe(v);
     }
     EXPECT_GT(different, 20u);
   }
@@ -178,7 +181,7 @@ TEST(World, OfABuildingUpdatedByRegionIsTheOneBuiltAnew) {
       grid.set(v, map::Cell::occupied);
       changed.add(v);
     }
-    const auto updated = update_world(*before, grid, changed, Model{});
+    const auto updated = rebuilt(*before, {.grid = grid, .voxels = changed});
     const auto anew = build_world(grid, Model{}, vehicle_5in());
     std::size_t differ = 0;
     for (std::size_t n = 0; n < grid.cell_count(); ++n) {
@@ -207,7 +210,7 @@ TEST(World, UpdatedByRegionIsTheWorldBuiltAnewForAWideVehicleToo) {
     changed.add({20, 25, k});
   }
   const auto anew = build_world(grid, model, vehicle);
-  const auto updated = update_world(*before, grid, changed, model);
+  const auto updated = rebuilt(*before, {.grid = grid, .voxels = changed});
   int far = 0;
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     const Index3 v = grid.voxel(n);
@@ -218,7 +221,7 @@ TEST(World, UpdatedByRegionIsTheWorldBuiltAnewForAWideVehicleToo) {
 
   // And what goes gives places back.
   map::OccupancyGrid empty = before->grid;
-  const auto back = update_world(*anew, empty, changed, model);
+  const auto back = rebuilt(*anew, {.grid = empty, .voxels = changed});
   for (std::size_t n = 0; n < grid.cell_count(); ++n) {
     const Index3 v = grid.voxel(n);
     ASSERT_EQ(back->bounds.at(v).w, before->bounds.at(v).w) << v.transpose();
@@ -236,7 +239,8 @@ TEST(World, OfAPartSaysWhatTheWholeOneSaysThere) {
     Index3 low = grid.index(corner).cwiseMax(0), high = (low + Index3(35, 30, 0)).cwiseMin(last);
     low.z() = 0;
     high.z() = last.z();
-    const auto part = build_part(grid, {low, high}, Model{}, vehicle_5in());
+    const World alone = unbuilt_world(map::part_of(grid, {low, high}), Model{}, vehicle_5in());
+    const auto part = rebuilt(alone, {.voxels = map::all_of(alone.grid.size()), .around = &grid});
     for (std::size_t n = 0; n < part->grid.cell_count(); ++n) {
       const Index3 v = part->grid.voxel(n);
       ASSERT_EQ(part->grid.at(v), grid.at(low + v));

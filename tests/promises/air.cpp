@@ -56,7 +56,7 @@ Air::Air(Random& random, const Vehicle& vehicle)
   const bool window = random.chance(0.4);
   drawn.model.unknown_floor = window;
   world = plan::build_world(draw_map(random, {5, 5, 4}, {14, 14, 9}, window), drawn.model, vehicle);
-  if (drawn.factors != kModelledAir) world = plan::with_air(*world, drawn.factors, drawn.model);
+  if (drawn.factors != kModelledAir) world = plan::rebuilt(*world, {.air = drawn.factors});
   for (std::size_t n = 0; n < world->grid.cell_count(); ++n) w.push_back(world->bounds.at(world->grid.voxel(n)).w);
   demand_field(random);
 }

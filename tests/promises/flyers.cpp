@@ -24,7 +24,7 @@ FlyersWorld draw_flyers_world(Random& random, const Index3& least, const Index3&
     try {
       const DrawnVehicle drawn = draw_flyer(random, random.chance(0.2));
       auto world = plan::build_world(draw_map(random, least, most, window), air.model, drawn.vehicle);
-      if (air.factors != kModelledAir) world = plan::with_air(*world, air.factors, air.model);
+      if (air.factors != kModelledAir) world = plan::rebuilt(*world, {.air = air.factors});
       if (safe_places(*world).size() > world->grid.cell_count() / 20) return {drawn, world};
     } catch (const std::invalid_argument&) {  // a loop that settles too late
     }

@@ -71,7 +71,7 @@ TEST(Promises, AnUpdatedWorldIsTheOneBuiltAnew) {
     const auto margin = random.chance(0.1) ? std::optional(random.uniform(0, 0.3)) : std::nullopt;
     const auto anew = [&](const map::OccupancyGrid& grid) {
       const auto world = plan::build_world(grid, air.model, vehicle, method, margin);
-      return air.factors == kModelledAir ? world : plan::with_air(*world, air.factors, air.model);
+      return air.factors == kModelledAir ? world : plan::rebuilt(*world, {.air = air.factors});
     };
     map::OccupancyGrid grid = draw_map(random, {1, 1, 1}, {50, 36, 24}, window);
     try {
@@ -87,7 +87,7 @@ TEST(Promises, AnUpdatedWorldIsTheOneBuiltAnew) {
             changed.add(v);
           }
         }
-        world = plan::update_world(*world, grid, changed, air.model);
+        world = plan::rebuilt(*world, {.grid = grid, .voxels = changed});
         demand_same_worlds(*world, *anew(grid), random);
         places += safe_places(*world).size();
       }

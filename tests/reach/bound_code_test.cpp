@@ -139,7 +139,7 @@ TEST(BoundCode, AnInfiniteBoundLeavesNoPlaceToHover) {
               0);
     map::OccupancyGrid changed = grid;
     changed.set({5, 5, 5}, map::Cell::occupied);
-    const auto updated = plan::update_world(*world, changed, {{5, 5, 5}, {5, 5, 5}}, model);
+    const auto updated = plan::rebuilt(*world, {.grid = changed, .voxels = {{5, 5, 5}, {5, 5, 5}}});
     EXPECT_FALSE(updated->hover.safe({10, 10, 10}));
   }
 }

@@ -134,7 +134,8 @@ TEST(FlyRoute, CountsTheContactsOfAVehicleThatIsLargerThanPlanned) {
   const Vehicle real = vehicle_5in();
   Vehicle believed = real;
   believed.body.radius = 0.02;
-  const auto wrong = plan::with_clearance_by(world_of("corridors", believed), reach::Method::tight, 0.0);
+  const auto wrong = *plan::rebuilt(world_of("corridors", believed),
+                                    {.clearance = plan::Clearance{plan::sets_of(believed, reach::Method::tight), 0.0}});
   std::size_t contacts = 0, flights = 0;
   for (const auto& pair : pairs_in(world_of("corridors", real), 12, 3)) {
     const auto route = fly_route(wrong, real, pair);

@@ -221,7 +221,7 @@ TEST(ExtendedModel, AnUpdatedWorldEqualsOneBuiltAnew) {
       box.add({i, 22, k});
     }
   const auto anew = plan::build_world(changed, model, vehicle());
-  const auto updated = plan::update_world(*before, changed, box, model);
+  const auto updated = plan::rebuilt(*before, {.grid = changed, .voxels = box});
   int moved = 0;
   for (std::size_t n = 0; n < anew->grid.cell_count(); ++n) {
     const Index3 v = anew->grid.voxel(n);

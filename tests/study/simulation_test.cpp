@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/config/simulation_terms.hpp"
@@ -62,6 +63,18 @@ double mean_square(const Observations& seen, Channel c) {
 
 TEST(Simulation, EveryFormSaysWhatItAddsToIt) {
   for (const Form* form : catalogue()) EXPECT_TRUE(form->simulate) << form->formula;
+}
+
+TEST(Simulation, ATermThatNoModelFileHoldsIsNamed) {
+  const auto latency = std::ranges::find_if(catalogue(), [](auto* form) { return form->cause() == "command_latency"; });
+  NamedCause cause{};
+  cause.found.form = *latency;
+  cause.found.theta = Eigen::VectorXd::Constant(1, 0.2);
+  EXPECT_EQ(why_unwritable(cause, {}), std::nullopt);
+  cause.found.theta[0] = 0.5;
+  EXPECT_EQ(why_unwritable(cause, {}), "setpoint_delay: number 1 of value is 0.5, wanted in [-0.3, 0.3]");
+  cause.found.theta[0] = NAN;
+  EXPECT_EQ(why_unwritable(cause, {}), "setpoint_delay: number 1 of value is nan, wanted in [-0.3, 0.3]");
 }
 
 TEST(Simulation, ComesNearerToFurtherFlightsByWhatTheStudyFound) {

@@ -79,12 +79,12 @@ TEST(SomeFlights, TellSharesAsShares) {
   rotor.columns = form("rotor_sensor_fault")->columns(windows, Scale());
   weight.columns = form("payload")->columns(windows, Scale());
   rotor.parameters = {{"e", 2 * std::log(0.54), 2 * std::log(0.5), 0}, {"rotor", 3, 3, 3}};
-  tell_shares(rotor);
+  rotor = tell_shares(rotor);
   EXPECT_NEAR(rotor.parameters[0].value, 0.54 * 0.54 - 1, 1e-12);
   EXPECT_NEAR(rotor.parameters[0].low, -0.75, 1e-12);
   EXPECT_EQ(rotor.parameters[1].value, 3);
   weight.parameters = {{"m_first", std::log(1.2 / 0.8) / 2, 0, 0}, {"m_second", 0, 0, 0}, {"pairing", 2, 2, 2}};
-  tell_shares(weight);
+  weight = tell_shares(weight);
   EXPECT_NEAR(weight.parameters[0].value, 0.2, 1e-12) << "(1 + m) and (1 - m) of the mean";
 }
 

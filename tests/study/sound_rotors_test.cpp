@@ -66,24 +66,25 @@ TEST(SoundRotors, AreLearntFromReferenceFlightsAndTakenOut) {
   EXPECT_GE(sound->spread, 0.01);
   EXPECT_LT(sound->spread, 0.03);
   auto seen = flown({0.15 + 0.06, -0.1 - 0.02, -0.1 - 0.02, 0.05 - 0.02}, 12);
-  EXPECT_FALSE(settle_rotors(sound, seen));
-  EXPECT_NEAR(seen.y[kMotor1][5], 0.06, 1e-9);
+  const auto settled = settle_rotors(sound, seen);
+  EXPECT_FALSE(settled.unjudged);
+  EXPECT_NEAR(settled.seen.y[kMotor1][5], 0.06, 1e-9);
   EXPECT_FALSE(sound_rotors(flown(built, 3))) << "three flights are no reference";
 }
 
 TEST(SoundRotors, WithoutAReferenceWhatCraftDifferByIsNotJudgedAndWhatIsMoreStays) {
-  auto seen = flown({0.15, -0.1, -0.1, 0.05}, 12);
-  EXPECT_NEAR(settle_rotors(std::nullopt, seen).value_or(0), 0.15, 1e-9);
-  EXPECT_NEAR(seen.y[kMotor1][5], 0, 1e-9);
-  auto broken = flown({0.45, -0.15, -0.15, -0.15}, 12);
-  EXPECT_FALSE(settle_rotors(std::nullopt, broken));
-  EXPECT_NEAR(broken.y[kMotor1][5], 0.45, 1e-9);
+  const auto settled = settle_rotors(std::nullopt, flown({0.15, -0.1, -0.1, 0.05}, 12));
+  EXPECT_NEAR(settled.unjudged.value_or(0), 0.15, 1e-9);
+  EXPECT_NEAR(settled.seen.y[kMotor1][5], 0, 1e-9);
+  const auto broken = settle_rotors(std::nullopt, flown({0.45, -0.15, -0.15, -0.15}, 12));
+  EXPECT_FALSE(broken.unjudged);
+  EXPECT_NEAR(broken.seen.y[kMotor1][5], 0.45, 1e-9);
 }
 
 TEST(SoundRotors, AreThoseOfTheSoundHalfOfTheFlights) {
   auto seen = flown({0.01, -0.01, 0, 0}, 12);
   for (std::size_t i = seen.first[6]; i < seen.windows.size(); ++i) seen.y[kMotor4][i] -= 0.4;
-  settle_rotors(std::nullopt, seen);
+  seen = settle_rotors(std::nullopt, seen).seen;
   EXPECT_NEAR(seen.y[kMotor4][5], 0, 0.03);
   EXPECT_NEAR(seen.y[kMotor4].back(), -0.4, 0.03);
 }

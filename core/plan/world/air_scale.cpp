@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "core/field/field_update.hpp"
-#include "core/field/whole_field.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -23,20 +22,6 @@ Model walls_alone(Model model) {
   return model;
 }
 
-/// Σ of a model at the listed voxels of some columns, from what can reach them alone.
-void fill_columns(field::DisturbanceField& field, const map::OccupancyGrid& grid, const Model& model,
-                  const map::VoxelBox& columns, std::span<const std::size_t> listed, const Parallel& parallel) {
-  map::VoxelBox around = field::affected_columns(grid, model, columns);
-  if (model.unknown_floor) around.low.z() = -1;  // what is below the map is unknown, too
-  const map::OccupancyGrid part = map::part_of(grid, around);
-  std::vector<std::size_t> of_part;
-  of_part.reserve(listed.size());
-  for (const std::size_t n : listed) of_part.push_back(part.linear(grid.voxel(n) - around.low));
-  const field::WholeField sweep(part, model, of_part);
-  parallel(sweep.block_count(),
-           [&](std::size_t begin, std::size_t end) { field.fill(sweep, part, around.low, begin, end); });
-}
-
 }  // namespace
 
 void AirScale::update(const map::OccupancyGrid& grid, const Model& model, const map::VoxelBox& columns,
@@ -45,9 +30,13 @@ void AirScale::update(const map::OccupancyGrid& grid, const Model& model, const 
   field::DisturbanceField all =
       sigma ? field::DisturbanceField(grid, voxels, *sigma, columns) : field::DisturbanceField(grid, voxels);
   field::DisturbanceField ground(grid, inside), walls(grid, inside);
-  fill_columns(all, grid, model, columns, inside, parallel);
-  fill_columns(ground, grid, ground_alone(model), columns, inside, parallel);
-  fill_columns(walls, grid, walls_alone(model), columns, inside, parallel);
+  const auto fill = [&](field::DisturbanceField& field, const Model& of) {
+    const auto store = [&](const Index3& v, const Variance& s) { field.set(grid.linear(v), s); };
+    field::evaluate_columns(grid, of, columns, inside, store, parallel);
+  };
+  fill(all, model);
+  fill(ground, ground_alone(model));
+  fill(walls, walls_alone(model));
   const auto base = Variance::horizontal_vertical(model.base.horizontal, model.base.vertical);
   classes.resize(grid.cell_count(), AirClass::none);
   for (const std::size_t n : inside) {
@@ -58,13 +47,7 @@ void AirScale::update(const map::OccupancyGrid& grid, const Model& model, const 
   sigma = std::move(all);
 }
 
-field::DisturbanceField AirScale::flown() const {
-  field::DisturbanceField rougher = *sigma;
-  if (factors != kModelledAir) rougher.scale(classes, factors);
-  return rougher;
-}
-
-// In single precision, as the field is scaled.
+// In single precision, as Σ is stored.
 Variance AirScale::flown_at(std::size_t n) const noexcept {
   const Variance s = sigma->at(n);
   const auto factor = static_cast<float>(factor_of(factors, classes[n]));

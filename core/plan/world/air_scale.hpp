@@ -26,9 +26,7 @@ struct AirScale {
   /// what each adds. `voxels`: all that have bounds now; `inside`: those in the columns.
   void update(const map::OccupancyGrid& grid, const Model& model, const map::VoxelBox& columns,
               std::span<const std::size_t> voxels, std::span<const std::size_t> inside, const Parallel& parallel);
-  /// Σ times the factor of each voxel's class: what the sets are made of. Precondition: known.
-  field::DisturbanceField flown() const;
-  /// That at one voxel with a Σ, by its linear index.
+  /// Σ times the factor of its class at a voxel with a Σ, by its linear index: what the sets are made of.
   Variance flown_at(std::size_t n) const noexcept;
 };
 

@@ -17,17 +17,18 @@ GainStep with_gains(const World& world, const Vec3& start_W, const Vec3& goal_W,
   kp = {factor * factor * kp.horizontal, factor * factor * kp.vertical};
   kd = {factor * kd.horizontal, factor * kd.vertical};
   GainStep step{factor, false, kp, kd, {}, {}};
-  World faster = world;
+  Change change;
   try {
-    faster.reach = reach::Reachability(vehicle, world.reach.method, world.reach.loop);
+    change.clearance =
+        Clearance{reach::Reachability(vehicle, world.reach.method, world.reach.loop), world.constant_margin};
   } catch (const std::invalid_argument&) {
     return step;
   }
   step.stable = true;
-  faster = with_clearance_by(std::move(faster), world.reach.method, world.constant_margin, parallel);
-  step.way = widest_way(faster, start_W, goal_W);
+  const auto faster = rebuilt(world, std::move(change), parallel);
+  step.way = widest_way(*faster, start_W, goal_W);
   if (step.way)
-    step.set = reach::hover_set(faster.reach, faster.grid, faster.distance, faster.bounds, step.way->place_W,
+    step.set = reach::hover_set(faster->reach, faster->grid, faster->distance, faster->bounds, step.way->place_W,
                                 world.constant_margin);
   return step;
 }

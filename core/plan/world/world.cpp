@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "core/field/field_update.hpp"
-#include "core/field/whole_field.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -17,51 +17,23 @@ map::VoxelBox grown(const map::VoxelBox& box, const Index3& by, const Index3& si
   return {(box.low - by).cwiseMax(0), (box.high + by).cwiseMin(size - Index3::Ones())};
 }
 
-/// The grid's columns, in pieces of about 300 × 300: what is needed besides the world itself is that of one piece.
-std::vector<map::VoxelBox> pieces(const Index3& size) {
+/// A box in pieces of about 300 × 300 columns: what is needed besides the world itself is that of one piece.
+std::vector<map::VoxelBox> pieces(const map::VoxelBox& box) {
+  const Index3 size = box.high - box.low + Index3::Ones();
   constexpr int kMost = 320;  // voxels
   const auto parts = [](int n) { return (n + kMost - 1) / kMost; };
   const int nx = parts(size.x()), ny = parts(size.y());
   std::vector<map::VoxelBox> result;
   for (int j = 0; j < ny; ++j)
     for (int i = 0; i < nx; ++i)
-      result.push_back({{size.x() * i / nx, size.y() * j / ny, 0},
-                        {size.x() * (i + 1) / nx - 1, size.y() * (j + 1) / ny - 1, size.z() - 1}});
+      result.push_back({box.low + Index3(size.x() * i / nx, size.y() * j / ny, 0),
+                        box.low + Index3(size.x() * (i + 1) / nx - 1, size.y() * (j + 1) / ny - 1, size.z() - 1)});
   return result;
 }
 
-/// Bounds of Σ, evaluated anew in whole columns from what can reach them alone. `whole`: the map in which that is; the
-/// grid of `bounds` is a part of it, from its voxel `low` on. Columns and listed voxels are those of the part.
-void update_bounds(reach::BoundField& bounds, const map::OccupancyGrid& whole, const Index3& low, const Index3& size,
-                   const Model& model, const map::VoxelBox& columns, std::span<const std::size_t> listed,
-                   const Parallel& parallel) {
-  map::VoxelBox around = field::affected_columns(whole, model, {low + columns.low, low + columns.high});
-  if (model.unknown_floor) around.low.z() = -1;  // what is below the map is unknown, too
-  const map::OccupancyGrid reached = map::part_of(whole, around);
-  const Index3 shift = low - around.low;
-  std::vector<std::size_t> of_reached;
-  of_reached.reserve(listed.size());
-  for (const std::size_t n : listed) of_reached.push_back(reached.linear(map::voxel(size, n) + shift));
-  const field::WholeField sweep(reached, model, of_reached);
-  const field::Extension& air = bounds.extension();
-  const auto fill = [&](const auto& store) {
-    parallel(sweep.block_count(), [&](std::size_t begin, std::size_t end) {
-      sweep.evaluate(begin, end, [&](std::size_t n, const Variance& s) {
-        const Index3 v = reached.voxel(n) - shift;
-        const auto factor = air.by_place() ? static_cast<float>(std::exp(air.at(v).ln_variance)) : 1.f;
-        const auto single = [factor](double of_s) { return factor * static_cast<float>(of_s); };
-        store(map::linear(size, v), Variance{single(s.xx), single(s.xy), 0, single(s.yy), 0, single(s.zz)});
-      });
-    });
-  };
-  bounds.update(columns, listed, fill, parallel);
-}
-
-/// Stores a model's extension at the listed voxels.
-void fill_air(field::Extension& air, const map::OccupancyGrid& grid, std::span<const std::size_t> listed,
-              const Parallel& parallel) {
-  parallel(listed.size(),
-           [&](std::size_t begin, std::size_t end) { air.fill(grid, listed.subspan(begin, end - begin)); });
+/// The voxels of a box where the vehicle's centre can be.
+std::vector<std::size_t> listed(const World& world, const map::VoxelBox& box) {
+  return voxels_for_centre(world.grid, world.distance, world.reach.vehicle, box);
 }
 
 /// The free voxels, linear, in rising order.
@@ -72,22 +44,111 @@ std::vector<std::size_t> voxels_where(const map::OccupancyGrid& free) {
   return voxels;
 }
 
-/// Where hovering is safe, at the listed voxels.
-void fill_hover(reach::HoverMap& hover, const reach::Reachability& reach, const map::OccupancyGrid& grid,
-                const map::DistanceField& distance, const map::OccupancySums& sums, const reach::BoundField& bounds,
-                std::span<const std::size_t> listed, std::optional<double> constant_margin, const Parallel& parallel) {
-  parallel(listed.size(), [&](std::size_t begin, std::size_t end) {
-    hover.fill(reach, grid, distance, sums, bounds, listed.subspan(begin, end - begin), constant_margin);
-  });
+/// The first stage takes the map: what a change reaches in distances and box counts, they find themselves.
+World on_map(World world, map::OccupancyGrid grid, const map::VoxelBox& changed) {
+  world.distance.update(grid, changed);
+  world.sums.update(grid, changed.low, changed.high);
+  world.grid = std::move(grid);
+  return world;
 }
 
-/// Where the hover map can change: a set reads w̄ over itself, and obstacles up to 1 m (the cap of its clearance) and
-/// the body around it. No set is wider than the largest bound of all makes it.
-map::VoxelBox reached_by_hover(const World& world, const reach::BoundField& bounds, const map::VoxelBox& field,
-                               const map::VoxelBox& changed) {
+/// Where Σ, or what an extension adds, can change, and where the vehicle's centre gets places or loses them.
+map::VoxelBox columns_reached(const World& world, const map::VoxelBox& changed) {
+  if (changed.empty()) return {};
+  map::VoxelBox columns = field::affected_columns(world.grid, world.model, changed);
+  const field::Extension& air = world.bounds.extension();
+  // A wide body's centre gets places, or loses them, beyond the field's range.
+  const double beside = std::max(world.reach.vehicle.body.radius, air.by_place() ? air.level_range() : 0);
+  const int by = static_cast<int>(std::ceil(beside / world.grid.resolution())) + 1;
+  const map::VoxelBox near = grown(changed, {by, by, world.grid.size().z()}, world.grid.size());
+  columns.add(near.low);
+  columns.add(near.high);
+  return columns;
+}
+
+/// Σ at some voxels of whole columns, from what can reach them alone in the map that the world is a part of.
+reach::FillVariance variance_in(const World& world, const map::OccupancyGrid& whole, const map::VoxelBox& columns,
+                                std::span<const std::size_t> voxels, const Parallel& parallel) {
+  return [&, columns, voxels](const auto& store) {
+    const Index3 low = ((world.grid.origin() - whole.origin()) / whole.resolution()).array().round().cast<int>();
+    std::vector<std::size_t> of_whole;
+    of_whole.reserve(voxels.size());
+    for (const std::size_t n : voxels) of_whole.push_back(whole.linear(world.grid.voxel(n) + low));
+    const field::Extension& air = world.bounds.extension();
+    const auto take = [&](const Index3& of, const Variance& s) {
+      const Index3 v = of - low;
+      const auto factor = air.by_place() ? static_cast<float>(std::exp(air.at(v).ln_variance)) : 1.f;
+      const auto single = [factor](double of_s) { return factor * static_cast<float>(of_s); };
+      store(world.grid.linear(v), Variance{single(s.xx), single(s.xy), 0, single(s.yy), 0, single(s.zz)});
+    };
+    field::evaluate_columns(whole, world.model, {low + columns.low, low + columns.high}, of_whole, take, parallel);
+  };
+}
+
+/// The second stage takes the map and a model, in the columns that the change reaches.
+World with_bounds(World world, const map::VoxelBox& columns, const map::OccupancyGrid* around,
+                  const Parallel& parallel) {
+  const map::OccupancyGrid& whole = around ? *around : world.grid;
+  if (world.bounds.extension().by_place()) world.bounds.extend(world.grid, listed(world, columns), parallel);
+  if (world.air.known()) {
+    const auto inside = listed(world, columns), all = listed(world, map::all_of(world.grid.size()));
+    world.air.update(world.grid, world.model, columns, all, inside, parallel);
+    world.bounds.update(columns, inside, [&](const auto& store) {
+      for (const std::size_t n : inside) store(n, world.air.flown_at(n));
+    });
+    return world;
+  }
+  for (const map::VoxelBox& piece : pieces(columns)) {
+    const auto inside = listed(world, piece);
+    world.bounds.update(piece, inside, variance_in(world, whole, piece, inside, parallel), parallel);
+  }
+  return world;
+}
+
+/// Takes the factors of the air too, which reach the bounds of the classes whose factor is another.
+World in_air(World world, const AirFactors& factors, const Parallel& parallel) {
+  const map::VoxelBox all = map::all_of(world.grid.size());
+  if (!world.air.known()) {
+    const auto voxels = listed(world, all);
+    world.air.update(world.grid, world.model, all, voxels, voxels, parallel);
+  }
+  const AirFactors before = std::exchange(world.air.factors, factors);
+  if (before == factors) return world;
+  world.bounds.revalue(
+      [&](std::size_t n) -> std::optional<Variance> {
+        const AirClass air = world.air.classes[n];
+        if (factor_of(factors, air) == factor_of(before, air)) return std::nullopt;
+        return world.air.flown_at(n);
+      },
+      parallel);
+  return world;
+}
+
+/// The third stage takes a vehicle's loop, which reaches all places to hover.
+World clear_by(World world, Clearance clearance) {
+  world.reach = std::move(clearance.reach);
+  world.response = CentreResponse(world.reach.vehicle, world.reach.loop);
+  world.constant_margin = clearance.margin;
+  return world;
+}
+
+/// What a change is to be compared with.
+struct Before {
+  DisturbanceBound largest;
+  AirFactors air;
+};
+
+/// Where hovering can become safe or unsafe: a set reads w̄ over itself, and obstacles up to 1 m (the cap of its
+/// clearance) and the body around it. No set is wider than the largest bound of all makes it.
+map::VoxelBox places_reached(const World& world, const Before& before, const map::VoxelBox& columns,
+                             const Change& change) {
   const auto& grid = world.grid;
-  const auto after = bounds.largest(), before = world.bounds.largest();
-  const double w = std::max(std::ranges::max(after.w), std::ranges::max(before.w));
+  const bool of_all = change.clearance || world.air.factors != before.air;
+  if (columns.empty() && !of_all) return {};
+  // Pushes of anywhere widen the largest sets; an integrator may hold what blows anywhere.
+  if (of_all || world.bounds.extension().by_place() || reach::has_integrator(world.reach.vehicle))
+    return map::all_of(grid.size());
+  const double w = std::max(std::ranges::max(world.bounds.largest().w), std::ranges::max(before.largest.w));
   const double h = std::max(w * std::max(world.reach.horizontal.h_inf, world.reach.vertical.h_inf),
                             world.constant_margin.value_or(0.0));
   const auto& vehicle = world.reach.vehicle;
@@ -95,12 +156,48 @@ map::VoxelBox reached_by_hover(const World& world, const reach::BoundField& boun
     const double most = grid.size().maxCoeff(), count = std::ceil(metres / grid.resolution());
     return Index3::Constant(static_cast<int>(count < most ? count : most) + 2).eval();
   };
-  map::VoxelBox box = grown(field, voxels(h), grid.size());
+  map::VoxelBox box = grown(columns, voxels(h), grid.size());
   const map::VoxelBox near =
-      grown(changed, voxels(1 + vehicle.body.radius + vehicle.estimation.position + 2 * h), grid.size());
+      grown(change.voxels, voxels(1 + vehicle.body.radius + vehicle.estimation.position + 2 * h), grid.size());
   box.add(near.low);
   box.add(near.high);
   return box;
+}
+
+/// The last stage takes all of them. `safe_alone`: no place in the box can become safe.
+World with_hover(World world, const map::VoxelBox& box, bool safe_alone, const Parallel& parallel) {
+  const auto find = [&](std::span<const std::size_t> voxels) {
+    parallel(voxels.size(), [&](std::size_t begin, std::size_t end) {
+      world.hover.fill(world.reach, world.grid, world.distance, world.sums, world.bounds,
+                       voxels.subspan(begin, end - begin), world.constant_margin);
+    });
+  };
+  const auto safe = safe_alone ? voxels_where(world.hover.safe_voxels()) : std::vector<std::size_t>{};
+  world.hover.clear(box);
+  if (safe_alone)
+    find(safe);
+  else
+    for (const map::VoxelBox& piece : pieces(box)) find(listed(world, piece));
+  world.safe.update(world.hover.safe_voxels(), box);
+  return world;
+}
+
+constexpr std::size_t kKeptBytes = sizeof(reach::BoundCodes) + 1;  // of a voxel: w̄, and whether hovering is safe
+
+/// In place of all stages but the first, what they made before.
+std::shared_ptr<const World> restored(World world, std::string_view kept, const Parallel& parallel) {
+  const map::VoxelBox all = map::all_of(world.grid.size());
+  const auto voxels = listed(world, all);
+  if (kept.size() != voxels.size() * kKeptBytes) return nullptr;
+  std::vector<reach::BoundCodes> codes(voxels.size());
+  for (std::size_t n = 0; n < voxels.size(); ++n) {
+    std::memcpy(codes[n].data(), kept.data() + n * kKeptBytes, sizeof(reach::BoundCodes));
+    if (kept[n * kKeptBytes + kKeptBytes - 1]) world.hover.set_safe(world.grid.voxel(voxels[n]));
+  }
+  if (world.bounds.extension().by_place()) world.bounds.extend(world.grid, voxels, parallel);
+  world.bounds.restore(voxels, codes, parallel);
+  world.safe.update(world.hover.safe_voxels(), all);
+  return std::make_shared<const World>(std::move(world));
 }
 
 }  // namespace
@@ -128,140 +225,54 @@ reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method) {
   return {vehicle, method, method == reach::Method::paper ? reach::Loop::continuous : reach::Loop::vehicle};
 }
 
-namespace {
-
-/// The world of a grid, or of one that is a part of a whole map from its voxel `low` on.
-std::shared_ptr<const World> build(const map::OccupancyGrid* whole, const Index3& low, map::OccupancyGrid grid,
-                                   const Model& model, const Vehicle& vehicle, reach::Method method,
-                                   std::optional<double> constant_margin, const Parallel& parallel) {
-  const Model vehicle_model = with_vehicle(model, vehicle);
-  reach::Reachability reach = sets_of(vehicle, method);
+World unbuilt_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle, reach::Method method,
+                    std::optional<double> constant_margin) {
+  Model of_vehicle = with_vehicle(model, vehicle);
   map::DistanceField distance(grid);
   map::OccupancySums sums(grid);
-  const auto listed = [&](const map::VoxelBox& box) { return voxels_for_centre(grid, distance, vehicle, box); };
-
-  field::Extension air(grid, vehicle_model);
-  if (air.by_place()) fill_air(air, grid, listed(map::all_of(grid.size())), parallel);
-  reach::BoundField bounds(grid, model.bound, std::move(air));
-  for (const map::VoxelBox& piece : pieces(grid.size()))
-    update_bounds(bounds, whole ? *whole : grid, low, grid.size(), vehicle_model, piece, listed(piece), parallel);
+  reach::BoundField bounds(grid, model.bound, field::Extension(grid, of_vehicle));
   reach::HoverMap hover(grid);
-  for (const map::VoxelBox& piece : pieces(grid.size()))
-    fill_hover(hover, reach, grid, distance, sums, bounds, listed(piece), constant_margin, parallel);
   SafeSpace safe(hover.safe_voxels());
+  reach::Reachability reach = sets_of(vehicle, method);
   CentreResponse response(vehicle, reach.loop);
-  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(bounds),
-                                             std::move(hover), std::move(safe), std::move(reach), std::move(response),
-                                             constant_margin});
+  return {std::move(of_vehicle), std::move(grid), std::move(distance), std::move(sums),     std::move(bounds),
+          std::move(hover),      std::move(safe), std::move(reach),    std::move(response), constant_margin};
 }
 
-}  // namespace
+std::shared_ptr<const World> rebuilt(World world, Change change, const Parallel& parallel) {
+  if (change.kept) return restored(std::move(world), *change.kept, parallel);
+  const Before before{world.bounds.largest(), world.air.factors};
+  if (change.grid) world = on_map(std::move(world), std::move(*change.grid), change.voxels);
+  const map::VoxelBox columns = columns_reached(world, change.voxels);
+  if (!columns.empty()) world = with_bounds(std::move(world), columns, change.around, parallel);
+  if (change.air) world = in_air(std::move(world), *change.air, parallel);
+  if (change.clearance) world = clear_by(std::move(world), std::move(*change.clearance));
+  const map::VoxelBox places = places_reached(world, before, columns, change);
+  // Sets grow with the air: where hovering is not safe it is not in a rougher one.
+  const bool rougher =
+      columns.empty() && !change.clearance && larger(world.air.factors, before.air) == world.air.factors;
+  if (!places.empty()) world = with_hover(std::move(world), places, rougher, parallel);
+  return std::make_shared<const World>(std::move(world));
+}
 
 std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
                                          reach::Method method, std::optional<double> constant_margin,
                                          const Parallel& parallel) {
-  return build(nullptr, Index3::Zero(), std::move(grid), model, vehicle, method, constant_margin, parallel);
+  const map::VoxelBox all = map::all_of(grid.size());
+  return rebuilt(unbuilt_world(std::move(grid), model, vehicle, method, constant_margin), {.voxels = all}, parallel);
 }
 
-std::shared_ptr<const World> build_part(const map::OccupancyGrid& grid, const map::VoxelBox& columns,
-                                        const Model& model, const Vehicle& vehicle, const Parallel& parallel) {
-  return build(&grid, columns.low, map::part_of(grid, columns), model, vehicle, reach::Method::tight, std::nullopt,
-               parallel);
-}
-
-World with_clearance_by(World world, reach::Method method, std::optional<double> constant_margin,
-                        const Parallel& parallel) {
-  const Vehicle vehicle = world.reach.vehicle;
-  world.reach = sets_of(vehicle, method);
-  world.response = CentreResponse(vehicle, world.reach.loop);
-  world.constant_margin = constant_margin;
-  world.hover = reach::HoverMap(world.grid);
-  for (const map::VoxelBox& piece : pieces(world.grid.size()))
-    fill_hover(world.hover, world.reach, world.grid, world.distance, world.sums, world.bounds,
-               voxels_for_centre(world.grid, world.distance, vehicle, piece), constant_margin, parallel);
-  world.safe = SafeSpace(world.hover.safe_voxels());
-  return world;
-}
-
-std::shared_ptr<const World> with_air(const World& old, const AirFactors& factors, const Model& model,
-                                      const Parallel& parallel) {
-  World world = old;
-  if (!world.air.known()) {
-    const map::VoxelBox all = map::all_of(world.grid.size());
-    const auto voxels = voxels_for_centre(world.grid, world.distance, world.reach.vehicle, all);
-    world.air.update(world.grid, with_vehicle(model, world.reach.vehicle), all, voxels, voxels, parallel);
+std::string kept_of(const World& world) {
+  const auto voxels = listed(world, map::all_of(world.grid.size()));
+  std::string kept(voxels.size() * kKeptBytes, '\0');
+  char* to = kept.data();
+  for (const std::size_t n : voxels) {
+    const Index3 v = world.grid.voxel(n);
+    std::memcpy(to, world.bounds.codes(v).data(), sizeof(reach::BoundCodes));
+    to[kKeptBytes - 1] = static_cast<char>(world.hover.safe(v));
+    to += kKeptBytes;
   }
-  if (world.air.factors == factors) return std::make_shared<const World>(std::move(world));
-  world.air.factors = factors;
-  world.bounds.revalue(
-      [&](std::size_t n) -> std::optional<Variance> {
-        const AirClass air = world.air.classes[n];
-        if (factor_of(factors, air) == factor_of(old.air.factors, air)) return std::nullopt;
-        return world.air.flown_at(n);
-      },
-      parallel);
-  // Sets grow with the air: where hovering is not safe it is not in a rougher one.
-  const auto listed =
-      larger(factors, old.air.factors) == factors
-          ? voxels_where(old.hover.safe_voxels())
-          : voxels_for_centre(world.grid, world.distance, world.reach.vehicle, map::all_of(world.grid.size()));
-  world.hover = reach::HoverMap(world.grid);
-  fill_hover(world.hover, world.reach, world.grid, world.distance, world.sums, world.bounds, listed,
-             world.constant_margin, parallel);
-  world.safe = SafeSpace(world.hover.safe_voxels());
-  return std::make_shared<const World>(std::move(world));
-}
-
-std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid grid, const map::VoxelBox& changed,
-                                          const Model& model, const Parallel& parallel) {
-  if (changed.empty()) return std::make_shared<const World>(old);
-  const Vehicle& vehicle = old.reach.vehicle;
-  const Model vehicle_model = with_vehicle(model, vehicle);
-  map::DistanceField distance = old.distance;
-  distance.update(grid, changed);
-  map::OccupancySums sums = old.sums;
-  sums.update(grid, changed.low, changed.high);
-  const auto listed = [&](const map::VoxelBox& box) { return voxels_for_centre(grid, distance, vehicle, box); };
-
-  map::VoxelBox columns = field::affected_columns(grid, vehicle_model, changed);
-  const auto add_beside = [&](double metres) {
-    const int by = static_cast<int>(std::ceil(metres / grid.resolution())) + 1;
-    const map::VoxelBox beside = grown(changed, {by, by, grid.size().z()}, grid.size());
-    columns.add(beside.low);
-    columns.add(beside.high);
-  };
-  add_beside(vehicle.body.radius);  // a wide body's centre gets places, or loses them, beyond the field's range
-  reach::BoundField bounds = old.bounds;
-  const bool by_place = bounds.extension().by_place();
-  if (by_place) {
-    field::Extension air = bounds.extension();
-    add_beside(air.level_range());
-    fill_air(air, grid, listed(columns), parallel);
-    bounds.extend(std::move(air));
-  }
-  const std::vector<std::size_t> inside = listed(columns);
-  AirScale scale = old.air;
-  if (scale.known()) {
-    scale.update(grid, vehicle_model, columns, listed(map::all_of(grid.size())), inside, parallel);
-    const field::DisturbanceField flown = scale.flown();
-    bounds.update(columns, inside, [&](const auto& store) {
-      for (const std::size_t n : inside) store(n, flown.at(grid.voxel(n)));
-    });
-  } else {
-    update_bounds(bounds, grid, Index3::Zero(), grid.size(), vehicle_model, columns, inside, parallel);
-  }
-
-  // Pushes of anywhere widen the largest sets; an integrator may hold what blows anywhere.
-  const bool whole = by_place || reach::has_integrator(vehicle);
-  const map::VoxelBox hover_box = whole ? map::all_of(grid.size()) : reached_by_hover(old, bounds, columns, changed);
-  reach::HoverMap hover = old.hover;
-  hover.clear(hover_box);
-  fill_hover(hover, old.reach, grid, distance, sums, bounds, listed(hover_box), old.constant_margin, parallel);
-  SafeSpace safe = old.safe;
-  safe.update(hover.safe_voxels(), hover_box);
-  return std::make_shared<const World>(World{std::move(grid), std::move(distance), std::move(sums), std::move(bounds),
-                                             std::move(hover), std::move(safe), old.reach, old.response,
-                                             old.constant_margin, std::move(scale)});
+  return kept;
 }
 
 }  // namespace backwash::plan

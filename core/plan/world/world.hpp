@@ -29,8 +29,11 @@ std::vector<std::size_t> voxels_for_centre(const map::OccupancyGrid& grid, const
 Model with_vehicle(const Model& model, const Vehicle& vehicle);
 reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method);
 
-/// Immutable picture of the surroundings for one vehicle: everything the planner and the checks read.
+/// Immutable picture of the surroundings for one vehicle: everything the planner and the checks read. It is made in
+/// stages, each of what stands before it: map (grid, distance, sums), air (bounds, air), sets (reach, response,
+/// constant_margin), places to hover (hover, safe). rebuilt() makes each anew where a change reaches it.
 struct World {
+  Model model;  ///< with the vehicle's r0
   map::OccupancyGrid grid;
   map::DistanceField distance;
   map::OccupancySums sums;
@@ -43,46 +46,44 @@ struct World {
   AirScale air{};                         ///< what bounds and hover map hold beside the model
 };
 
-/// Builds all of it, Σ and its bounds by pieces of the map. Σ is computed at every free voxel where the vehicle's
-/// centre can be (voxels_for_centre), and not kept. The model's r0 is taken from the vehicle.
+/// What a vehicle keeps clear of obstacles by.
+struct Clearance {
+  reach::Reachability reach;       ///< of a vehicle with the body and estimation that the world was made for
+  std::optional<double> margin{};  ///< m: a ball in place of the reachable sets
+};
+
+/// What a world is made anew for. What is not named is as it was.
+struct Change {
+  std::optional<map::OccupancyGrid> grid{};  ///< the map, of the same place and size
+  map::VoxelBox voxels{};  ///< that alone differ in it, or all of a world in which nothing was found yet
+  /// The map that the grid is a part of: its bounds are those that the whole map gives there. Null: outside of the grid
+  /// nothing is known. Without an extension.
+  const map::OccupancyGrid* around = nullptr;
+  /// How much rougher than modelled the air is. Σ and the classes are found where the world has none, and kept from
+  /// then on. Cheaper where no factor falls. Without an extension.
+  std::optional<AirFactors> air{};
+  std::optional<Clearance> clearance{};
+  std::optional<std::string_view> kept{};  ///< what kept_of() gave for the same world, in place of all else
+};
+
+/// The surroundings with nothing found in them yet: no bound, and nowhere to hover.
+World unbuilt_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
+                    reach::Method method = reach::Method::tight, std::optional<double> constant_margin = std::nullopt);
+
+/// The world after a change: bit for bit the one built anew, made anew where the change can reach it and shared with
+/// `world` elsewhere. Σ is computed at free voxels where the vehicle's centre can be (voxels_for_centre), by pieces of
+/// the map. Null: `kept` has another length than the world wants; bytes of another world or damaged ones are not
+/// noticed, keep a hash beside them. Measured: core/plan/README.md, "A map that changes".
+std::shared_ptr<const World> rebuilt(World world, Change change, const Parallel& parallel = run_serial);
+
+/// That of an unbuilt_world() in which everything is found.
 std::shared_ptr<const World> build_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
                                          reach::Method method = reach::Method::tight,
                                          std::optional<double> constant_margin = std::nullopt,
                                          const Parallel& parallel = run_serial);
 
 /// What is dear in a world, as bytes to keep between runs: w̄ where the vehicle's centre can be, and where hovering is
-/// safe there. 11 bytes a voxel, of this machine's byte order. Precondition: a world of build_world().
+/// safe there. 11 bytes a voxel, of this machine's byte order.
 std::string kept_of(const World& world);
-/// The world that build_world() makes of these arguments, from what kept_of() gave for the same ones. Null where it has
-/// another length than they want; bytes of another world or damaged ones are not noticed: keep a hash beside them.
-std::shared_ptr<const World> restored_world(map::OccupancyGrid grid, const Model& model, const Vehicle& vehicle,
-                                            reach::Method method, std::optional<double> constant_margin,
-                                            std::string_view kept, const Parallel& parallel = run_serial);
-
-/// The world of a part of a map, to fly in until the whole one is made: the part's box of whole columns is a grid of
-/// its own, outside of which nothing is known, with the bounds that the whole map gives there. Where hovering is safe
-/// in it, it is in the whole one. Precondition: a model without an extension; `columns` within the grid, from floor to
-/// top.
-std::shared_ptr<const World> build_part(const map::OccupancyGrid& grid, const map::VoxelBox& columns,
-                                        const Model& model, const Vehicle& vehicle,
-                                        const Parallel& parallel = run_serial);
-
-/// The same surroundings kept clear of in another way: the bounds, the expensive part, are taken over; loop and
-/// hover map are made anew. Equal to building with that method and margin.
-World with_clearance_by(World world, reach::Method method, std::optional<double> constant_margin,
-                        const Parallel& parallel = run_serial);
-
-/// The same surroundings in air that is rougher by these factors: bounds and hover map are made anew. Cheaper where no
-/// factor is below that of `old`. Σ and the classes are found where `old` has none, and kept from then on. `old` must
-/// have been built with this model. What update_world() makes of it keeps both.
-std::shared_ptr<const World> with_air(const World& old, const AirFactors& factors, const Model& model,
-                                      const Parallel& parallel = run_serial);
-
-/// The same as build_world(grid, …), from a world of which only the voxels in `changed` differ: Σ and the hover map are
-/// computed anew where a change can reach them, and the rest is shared with `old` or copied. `old` must have been built
-/// with this model; precondition: grids of the same place and size. Measured: core/plan/README.md, "A map that
-/// changes".
-std::shared_ptr<const World> update_world(const World& old, map::OccupancyGrid grid, const map::VoxelBox& changed,
-                                          const Model& model, const Parallel& parallel = run_serial);
 
 }  // namespace backwash::plan

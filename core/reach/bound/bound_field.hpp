@@ -60,8 +60,11 @@ class BoundField {
   const BoundCodes& codes(const Index3& v) const noexcept { return tiles_.at(v).level[0]; }
   void restore(std::span<const std::size_t> listed, std::span<const BoundCodes> codes,
                const Parallel& parallel = run_serial);
-  /// Another extension of the same model. Wherever it says something else than before, update() must follow.
-  void extend(field::Extension extension) { extension_ = std::move(extension); }
+  /// What the extension adds by place anew at the listed voxels of the grid; update() of them must follow.
+  void extend(const map::OccupancyGrid& grid, std::span<const std::size_t> listed, const Parallel& parallel) {
+    parallel(listed.size(),
+             [&](std::size_t begin, std::size_t end) { extension_.fill(grid, listed.subspan(begin, end - begin)); });
+  }
   /// Largest w̄ of all voxels, m/s². O(voxels / 4096).
   DisturbanceBound largest() const noexcept;
   /// Over all stored voxels and velocities of up to v_max along each axis, m/s. O(voxels / 4096).

@@ -100,6 +100,14 @@ std::vector<SimulationTerm> simulation_of(const NamedCause& cause, const Observa
   return f.form->simulate({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
 }
 
+std::optional<std::string> why_unwritable(const NamedCause& cause, const Observations& seen) {
+  for (const auto& term : simulation_of(cause, seen))
+    if (auto why = config::why_unwritable(term)) return why;
+  for (const auto& effect : effects_of(cause, seen))
+    if (auto why = config::why_unwritable(effect)) return why;
+  return std::nullopt;
+}
+
 std::vector<SimulationTerm> simulation_of(const StudyResult& result, const Observations& seen) {
   std::vector<SimulationTerm> all;
   for (const auto& cause : result.causes)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,13 +33,16 @@ AppliedTerms apply(const std::vector<ExtensionTerm>& terms, Observations& seen);
 std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations& seen);
 /// What a cause adds to the simulation (core/sim).
 std::vector<SimulationTerm> simulation_of(const NamedCause& cause, const Observations& seen);
+/// Which number of either a model file cannot hold, or is none, by its kind; nothing: none. Such a cause does not join
+/// the model.
+std::optional<std::string> why_unwritable(const NamedCause& cause, const Observations& seen);
 /// Of all causes that join the model.
 std::vector<SimulationTerm> simulation_of(const StudyResult& result, const Observations& seen);
 /// The model with the effects of all causes that join it behind its own.
 Model extended(const Model& model, const StudyResult& result, const Observations& seen);
 
 /// Model file: the model's own tables, then a [[extension.term]] per cause that joins it, with its effects. `earlier`:
-/// the text of the terms that the model has already.
+/// the text of the terms that the model has already. Errors: throws std::invalid_argument with why_unwritable().
 std::string extended_model_text(const Model& model, const StudyResult& result, const Observations& seen,
                                 const std::string& base_name, const std::string& version,
                                 const std::string& earlier = "");

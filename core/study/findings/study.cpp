@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/study/findings/extend.hpp"
 #include "core/study/findings/where_it_acts.hpp"
 #include "core/study/findings/words.hpp"
 #include "core/study/inference/coverage.hpp"
@@ -30,8 +31,12 @@ std::vector<double> held_out(const Accepted& cause, const NormalEquations& norma
   return sum;
 }
 
+struct Covered {
+  double before = 0, after = 0;
+};
+
 /// Share of the windows' samples within the central 90 %, without and with what the cause moves by channel.
-void add_coverage(Gain& gain, const Observations& seen, const std::array<std::vector<double>, kChannels>& moved) {
+Covered covered(const Observations& seen, const std::array<std::vector<double>, kChannels>& moved) {
   double covered_before = 0, covered_after = 0, samples = 0;
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t mean = kMeanX + static_cast<std::size_t>(axis), variance = kVarX + static_cast<std::size_t>(axis);
@@ -45,10 +50,7 @@ void add_coverage(Gain& gain, const Observations& seen, const std::array<std::ve
       samples += 1;
     }
   }
-  if (samples > 0) {
-    gain.coverage_before = covered_before / samples;
-    gain.coverage_after = covered_after / samples;
-  }
+  return samples > 0 ? Covered{covered_before / samples, covered_after / samples} : Covered{};
 }
 
 /// `total`: of all accepted causes; `own`: of this one. Residuals y − (total − own) before, y − total after.
@@ -99,11 +101,21 @@ Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::si
     gain.rmse_before = std::sqrt(before / count);
     gain.rmse_after = std::sqrt(after / count);
   }
-  add_coverage(gain, seen, moved);
+  const Covered shares = covered(seen, moved);
+  gain.coverage_before = shares.before;
+  gain.coverage_after = shares.after;
   return gain;
 }
 
-std::vector<std::pair<std::string, std::string>> untested(const Observations& seen) {
+/// Flights with windows.
+std::size_t flown(const Observations& seen) {
+  std::size_t count = 0;
+  for (std::size_t f = 0; f < seen.units.size(); ++f) count += seen.units.first[f + 1] > seen.units.first[f] ? 1u : 0u;
+  return count;
+}
+
+/// Effects and why they are not tested. `unjudged`: by how much the rotors differ without being judged, ln.
+std::vector<std::pair<std::string, std::string>> untested(const Observations& seen, std::optional<double> unjudged) {
   std::vector<std::pair<std::string, std::string>> all;
   for (const Effect& effect : effects()) {
     std::string why;
@@ -115,24 +127,35 @@ std::vector<std::pair<std::string, std::string>> untested(const Observations& se
     }
     if (!tested) all.emplace_back(effect.name, why);
   }
+  for (const Effect& effect : effects())
+    if (unjudged && (effect.at_rotors == AtRotors::propeller || effect.at_rotors == AtRotors::sensor))
+      all.emplace_back(effect.name,
+                       "the same in all flights and no more than craft are built with: the rotors differ by " +
+                           percent(*unjudged) + ", as those of a sound craft may; give --reference flights");
   return all;
 }
 
-/// Where nothing else was found, a dependence is a structure without a name, at its share of the verdict's level.
-/// Beside an accepted cause, or one that the model holds, it is a hint: with enough flights the error of the cause's
-/// form is found as well.
-void look_at_what_remains(StudyResult& result, const Evidence& evidence, const std::vector<DesignColumn>& accepted,
-                          const CauseSearchOptions& options) {
-  const bool silent = result.causes.empty() && result.unknown.empty() && options.known.empty();
+/// Where nothing else was found, a dependence is looked for at its share of the verdict's level.
+std::vector<Dependence> what_remains(const Evidence& evidence, const std::vector<Accepted>& accepted, bool silent,
+                                     const CauseSearchOptions& options) {
+  options.progress("whether what remains depends on something");
   const double level = silent ? kRules.dependence_share * options.accept_p : kRules.dependence_level.value;
-  result.remaining = remaining_dependence(evidence, accepted, options.seed, level);
-  if (!silent || result.remaining.empty() || !result.remaining.front().found) return;
-  const Dependence& first = result.remaining.front();
-  result.unknown.push_back({first.regressor, first.group, first.p_holm / kRules.dependence_share, {}, "any", {}});
+  return remaining_dependence(evidence, columns_of(accepted, evidence.seen()), options.seed, level);
+}
+
+/// Where nothing else was found, a dependence is a structure without a name. Beside an accepted cause, or one that the
+/// model holds, it is a hint: with enough flights the error of the cause's form is found as well.
+std::vector<UnknownStructure> with_dependence(std::vector<UnknownStructure> unknown,
+                                              const std::vector<Dependence>& remaining, bool silent) {
+  if (!silent || remaining.empty() || !remaining.front().found) return unknown;
+  const Dependence& first = remaining.front();
+  unknown.push_back({first.regressor, first.group, first.p_holm / kRules.dependence_share, {}, "any", {}});
+  return unknown;
 }
 
 /// Gain, worth as applied and hover shift of what acts in all flights.
-void name_causes(StudyResult& result, const Evidence& evidence, const std::vector<Accepted>& accepted) {
+std::vector<NamedCause> in_all_flights(const Evidence& evidence, const std::vector<Accepted>& accepted) {
+  std::vector<NamedCause> causes;
   const auto applied = judge(evidence, accepted);
   for (std::size_t i = 0; i < accepted.size(); ++i) {
     NamedCause cause{accepted[i],
@@ -143,40 +166,31 @@ void name_causes(StudyResult& result, const Evidence& evidence, const std::vecto
                      largest_flown(accepted[i], evidence.seen()),
                      check_shift(accepted[i], applied[i].beside, evidence.seen())};
     if (cause.found.form->anchor) cause.found.scale.anchor = cause.found.form->anchor(evidence.seen().windows);
-    result.causes.push_back(std::move(cause));
+    const auto why = cause.applied.refused.empty() ? why_unwritable(cause, evidence.seen()) : std::nullopt;
+    if (why) cause.applied.refused = "no model file holds it: " + *why;
+    causes.push_back(std::move(cause));
   }
+  return causes;
 }
 
-/// `off`: by how much the rotors differ without being judged, ln.
-void leave_unjudged(StudyResult& result, double off) {
-  for (const Effect& effect : effects())
-    if (effect.at_rotors == AtRotors::propeller || effect.at_rotors == AtRotors::sensor)
-      result.not_tested.emplace_back(
-          effect.name, "the same in all flights and no more than craft are built with: the rotors differ by " +
-                           percent(off) + ", as those of a sound craft may; give --reference flights");
-}
+/// What a cause may be as well, and what would tell.
+struct Doubt {
+  const Form* form;
+  std::string what;
+};
 
 /// A rotor that lost a share of its thrust costs a quarter of it in all. Where the rotors differ as such a one would,
-/// unjudged, a payload is not told from it. Whether one was doubted.
-bool doubt_payloads(std::vector<NamedCause>& causes, double off) {
-  bool doubted = false;
-  for (auto& cause : causes) {
-    Accepted& found = cause.found;
-    if (found.form->effect->at_rotors != AtRotors::weight || found.form->motors_alone || !cause.flights.empty())
-      continue;
-    if (found.parameters.empty()) continue;
-    const double lost = found.parameters.front().value;
-    if (lost <= 0 || off < kRotorRules.unjudged_loss * lost) continue;
-    for (const Form* form : catalogue())
-      if (form->effect->at_rotors == AtRotors::propeller && !form->motors_alone) {
-        found.rivals.push_back({form->cause(), form, form->scales.front(), 0});
-        cause.separate_by.push_back(
-            {form->cause(), "none: give --reference flights of the craft while its rotors were sound", std::nullopt});
-        break;
-      }
-    doubted = true;
-  }
-  return doubted;
+/// unjudged, a payload is not told from it.
+std::optional<Doubt> doubted_payload(const NamedCause& cause, double unjudged) {
+  const Accepted& found = cause.found;
+  if (found.form->effect->at_rotors != AtRotors::weight || found.form->motors_alone || !cause.flights.empty() ||
+      found.parameters.empty())
+    return std::nullopt;
+  const double lost = found.parameters.front().value;
+  if (lost <= 0 || unjudged < kRotorRules.unjudged_loss * lost) return std::nullopt;
+  const auto propeller = std::ranges::find_if(
+      catalogue(), [](auto* form) { return form->effect->at_rotors == AtRotors::propeller && !form->motors_alone; });
+  return Doubt{*propeller, "none: give --reference flights of the craft while its rotors were sound"};
 }
 
 /// How much more thrust was commanded per unit of x, within flights, m/s².
@@ -195,31 +209,49 @@ double asked_along(const std::vector<double>& x, const Observations& seen) {
 }
 
 /// A drift of the sensor asks for no more thrust, a battery that sags for as much as the drift. Without a logged
-/// voltage the one is told as the other: where more than half of it was commanded both stand. Whether one was doubted.
-bool doubt_drifts(std::vector<NamedCause>& causes, const Observations& seen) {
+/// voltage the one is told as the other: where more than half of it was commanded both stand.
+std::optional<Doubt> doubted_drift(const NamedCause& cause, const Observations& seen) {
+  const Accepted& found = cause.found;
+  if (seen.has(Source::battery) || !seen.has(Source::thrust) || !found.form->in_sensor || found.columns.size() <= kZ)
+    return std::nullopt;
+  const double z = found.theta[kZ], asked = asked_along(found.columns[kZ].parts.back().x, seen);
+  if (-asked * z < z * z / 2) return std::nullopt;
   const auto sag =
       std::ranges::find_if(catalogue(), [](auto* f) { return std::ranges::count(f->needs, Source::battery) > 0; });
-  bool doubted = false;
+  return Doubt{*sag, "none: log the battery's voltage (battery_v)"};
+}
+
+/// All that was found, with what it is told apart by. `unjudged`: as of untested().
+std::vector<NamedCause> causes_of(const WholeSearch& whole, const Evidence& evidence, const Observations& seen,
+                                  std::optional<double> unjudged, const std::optional<SoundRotors>& sound) {
+  std::vector<NamedCause> causes = in_all_flights(evidence, whole.found.accepted);
+  for (const auto& cause : whole.some) causes.push_back(named(cause, evidence));
+  const double between_craft = sound ? sound->spread : kRotorRules.rotor_spread.value;
   for (auto& cause : causes) {
-    Accepted& found = cause.found;
-    if (seen.has(Source::battery) || !seen.has(Source::thrust) || !found.form->in_sensor || found.columns.size() <= kZ)
-      continue;
-    const double z = found.theta[kZ], asked = asked_along(found.columns[kZ].parts.back().x, seen);
-    if (-asked * z < z * z / 2) continue;
-    found.rivals.push_back({(*sag)->cause(), *sag, (*sag)->scales.front(), 0});
-    cause.separate_by.push_back({(*sag)->cause(), "none: log the battery's voltage (battery_v)", std::nullopt});
-    doubted = true;
+    const bool some = !cause.flights.empty();  // against the craft's own other flights
+    const double spread = some ? kRules.motor_scatter.value : between_craft;
+    cause.found = tell_shares(name_by_balance(std::move(cause.found), whole.rest, some, spread));
+    for (const Rival& rival : cause.found.rivals)
+      cause.separate_by.push_back(separations(evidence, cause.found, rival).front());
+    const auto payload = unjudged ? doubted_payload(cause, *unjudged) : std::nullopt;
+    for (const auto& doubt : {payload, doubted_drift(cause, seen)}) {
+      if (!doubt) continue;
+      cause.found.rivals.push_back({doubt->form->cause(), doubt->form, doubt->form->scales.front(), 0});
+      cause.separate_by.push_back({doubt->form->cause(), doubt->what, std::nullopt});
+    }
   }
-  return doubted;
+  return causes;
+}
+
+StudyVerdict verdict_of(const std::vector<NamedCause>& causes, const std::vector<UnknownStructure>& unknown) {
+  if (causes.empty()) return unknown.empty() ? StudyVerdict::nothing_found : StudyVerdict::unknown_structure;
+  const bool clear = std::ranges::all_of(causes, [](const auto& cause) { return cause.found.rivals.empty(); });
+  return clear ? StudyVerdict::cause_found : StudyVerdict::cannot_distinguish;
 }
 
 }  // namespace
 
-double coverage(const Observations& seen) {
-  Gain gain;
-  add_coverage(gain, seen, {});
-  return gain.coverage_before;
-}
+double coverage(const Observations& seen) { return covered(seen, {}).before; }
 
 const char* to_string(StudyVerdict verdict) {
   static const char* const kNames[] = {"cause_found", "cannot_distinguish", "unknown_structure", "nothing_found",
@@ -228,54 +260,30 @@ const char* to_string(StudyVerdict verdict) {
 }
 
 StudyResult study(const Observations& seen, const StudyOptions& options) {
-  StudyResult result;
-  result.not_tested = untested(seen);
-  std::size_t flown = 0;
-  for (std::size_t f = 0; f < seen.units.size(); ++f) flown += seen.units.first[f + 1] > seen.units.first[f] ? 1u : 0u;
-  if (flown < options.fewest_flights) {
-    result.verdict = StudyVerdict::insufficient;
-    return result;
-  }
-  Observations settled = seen;
-  const auto off = settle_rotors(options.sound, settled);
-  if (off) leave_unjudged(result, *off);
-  const WholeSearch whole = search_all(std::move(settled), options.search);
+  if (flown(seen) < options.fewest_flights)
+    return {.verdict = StudyVerdict::insufficient, .not_tested = untested(seen, std::nullopt)};
+  SettledRotors settled = settle_rotors(options.sound, seen);
+  const WholeSearch whole = search_all(std::move(settled.seen), options.search);
   const CauseSearchResult& found = whole.found;
-  result.threshold = found.threshold;
-  result.unknown = found.unknown;
-  result.refused = found.refused;
   Evidence evidence(whole.rest);
   evidence.whiten(columns_of(found.accepted, whole.rest));
-  name_causes(result, evidence, found.accepted);
-  for (const auto& cause : whole.some) result.causes.push_back(named(cause, evidence));
-  bool ambiguous = false;
-  for (auto& cause : result.causes) {
-    const bool some = !cause.flights.empty();  // against the craft's own other flights
-    name_by_balance(cause.found, whole.rest, some,
-                    some            ? kRules.motor_scatter.value
-                    : options.sound ? options.sound->spread
-                                    : kRotorRules.rotor_spread.value);
-    tell_shares(cause.found);
-    for (const Rival& rival : cause.found.rivals)
-      cause.separate_by.push_back(separations(evidence, cause.found, rival).front());
-    ambiguous = ambiguous || !cause.found.rivals.empty();
-  }
-  if (off) ambiguous = doubt_payloads(result.causes, *off) || ambiguous;
-  ambiguous = doubt_drifts(result.causes, seen) || ambiguous;
-  if (options.dependence) {
-    options.search.progress("whether what remains depends on something");
-    look_at_what_remains(result, evidence, columns_of(found.accepted, whole.rest), options.search);
-  }
-  result.verdict = !result.causes.empty() ? (ambiguous ? StudyVerdict::cannot_distinguish : StudyVerdict::cause_found)
-                   : !result.unknown.empty() ? StudyVerdict::unknown_structure
-                                             : StudyVerdict::nothing_found;
-  if (options.minimum_detectable) {
-    options.search.progress("smallest effects that these flights would show");
-    result.smallest_looked_for = true;
-    result.minimum_detectable =
-        minimum_detectable(evidence, options.search, std::max(found.threshold, kRules.least_threshold.value));
-  }
-  return result;
+  const auto causes = causes_of(whole, evidence, seen, settled.unjudged, options.sound);
+  const bool silent = causes.empty() && found.unknown.empty() && options.search.known.empty();
+  const auto remaining =
+      options.dependence ? what_remains(evidence, found.accepted, silent, options.search) : std::vector<Dependence>{};
+  const auto unknown = with_dependence(found.unknown, remaining, silent);
+  const double threshold = std::max(found.threshold, kRules.least_threshold.value);
+  if (options.minimum_detectable) options.search.progress("smallest effects that these flights would show");
+  return {.verdict = verdict_of(causes, unknown),
+          .causes = causes,
+          .unknown = unknown,
+          .refused = found.refused,
+          .not_tested = untested(seen, settled.unjudged),
+          .minimum_detectable = options.minimum_detectable ? minimum_detectable(evidence, options.search, threshold)
+                                                           : decltype(StudyResult::minimum_detectable){},
+          .smallest_looked_for = options.minimum_detectable,
+          .threshold = found.threshold,
+          .remaining = remaining};
 }
 
 std::map<std::string, std::map<std::string, double>> minimum_detectable(const Evidence& evidence,

@@ -52,17 +52,17 @@ struct StudyOptions {
 
 struct StudyResult {
   StudyVerdict verdict = StudyVerdict::nothing_found;
-  std::vector<NamedCause> causes;
-  std::vector<UnknownStructure> unknown;
-  std::vector<Refused> refused;  ///< causes that would have led, but for a size that no vehicle can have
-  std::vector<std::pair<std::string, std::string>> not_tested;  ///< name, why
+  std::vector<NamedCause> causes{};
+  std::vector<UnknownStructure> unknown{};
+  std::vector<Refused> refused{};  ///< causes that would have led, but for a size that no vehicle can have
+  std::vector<std::pair<std::string, std::string>> not_tested{};  ///< name, why
   /// Per cause and parameter: least size found with 80 % power.
-  std::map<std::string, std::map<std::string, double>> minimum_detectable;
+  std::map<std::string, std::map<std::string, double>> minimum_detectable{};
   bool smallest_looked_for = false;  ///< whether that was computed
   double threshold = 0;              ///< nats
   /// Every pair tested, found ones first. Where nothing was accepted, those found make the verdict
   /// unknown_structure; else they are hints. Empty with too few flights.
-  std::vector<Dependence> remaining;
+  std::vector<Dependence> remaining{};
 };
 
 /// Share of the measured samples in the model's central 90 %.

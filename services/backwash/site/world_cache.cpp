@@ -165,9 +165,9 @@ CachedWorld::CachedWorld(WorldInput input)
 std::shared_ptr<const plan::World> CachedWorld::kept() const {
   if (key_.empty()) return nullptr;
   const auto bytes = read(file_of(folder_, key_), key_);
-  return bytes ? plan::restored_world(input_.grid, input_.model, input_.vehicle, input_.method, input_.margin, *bytes,
-                                      run_shown)
-               : nullptr;
+  if (!bytes) return nullptr;
+  return plan::rebuilt(plan::unbuilt_world(input_.grid, input_.model, input_.vehicle, input_.method, input_.margin),
+                       {.kept = *bytes}, run_shown);
 }
 
 std::shared_ptr<const plan::World> CachedWorld::made() const {

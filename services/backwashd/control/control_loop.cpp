@@ -11,6 +11,7 @@
 
 #include "core/log/raw/air_log.hpp"
 #include "core/log/raw/tick_log.hpp"
+#include "services/backwashd/channels.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -44,7 +45,7 @@ ControlLoop::ControlLoop(Channels& channels, firmware_bridge::AutopilotLink& lin
     : channels_(channels),
       link_(link),
       flight_(vehicle, battery_land, timing),
-      lookout_(channels, vehicle, map),
+      lookout_(channels, channels, vehicle, map),
       line_allowed_(firmware_bridge::line_allowed(vehicle, link.untold_delay())) {
   link_.tap(&ControlLoop::on_frame, this);
   const auto constants = log::constants(vehicle, battery_land, timing);

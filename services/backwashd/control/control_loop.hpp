@@ -6,7 +6,7 @@
 #include "core/track/orders.hpp"
 #include "firmware_bridge/autopilot_link.hpp"
 #include "firmware_bridge/message_requests.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/control/controlled.hpp"
 #include "services/backwashd/control/pilot_reaction.hpp"
 #include "services/backwashd/control/switch_reaction.hpp"
 #include "services/backwashd/in/parameter_reader.hpp"
@@ -15,6 +15,8 @@
 #include "services/backwashd/service_manager.hpp"
 
 namespace backwash::daemon {
+
+struct Channels;
 
 /// The 50 Hz tick: gathers what has arrived into a track::TickInput, lets track::FlightTick decide, sends what it
 /// decided, and records both. The one owner of the link.

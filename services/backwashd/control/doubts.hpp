@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/control/controlled.hpp"
 
 namespace backwash::daemon {
 

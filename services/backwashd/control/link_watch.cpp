@@ -11,6 +11,7 @@
 
 #include "firmware_bridge/mavlink/frame.hpp"
 #include "firmware_bridge/mavlink/messages.hpp"
+#include "services/backwashd/channels.hpp"
 
 namespace backwash::daemon {
 namespace {

@@ -2,10 +2,12 @@
 #pragma once
 
 #include "core/config/daemon_config.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/control/controlled.hpp"
 #include "services/backwashd/service_manager.hpp"
 
 namespace backwash::daemon {
+
+struct Channels;
 
 /// Opens what [link] device names. Not real-time: a TCP connection is waited for half a second.
 tl::expected<firmware_bridge::Port, firmware_bridge::PortError> open_port(const decltype(config::Daemon::link)& link);

@@ -5,7 +5,9 @@
 #include <map>
 #include <string>
 
-#include "services/backwashd/channels.hpp"
+#include "core/sync/latest_value.hpp"
+#include "services/backwashd/clock.hpp"
+#include "services/backwashd/text.hpp"
 
 namespace backwash::daemon {
 

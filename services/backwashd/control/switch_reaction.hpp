@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/track/supervisor.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/out/switched.hpp"
 
 namespace backwash::daemon {
 

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <thread>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/out/shown_diagnostics.hpp"
 #include "services/backwashd/out/shown_status.hpp"
 #include "services/backwashd/text.hpp"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/config/daemon_config.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/clock.hpp"
 #include "services/backwashd/control/refusals.hpp"
 #include "services/backwashd/in/allowance.hpp"
 #include "services/backwashd/in/drift_notice.hpp"
@@ -17,6 +17,7 @@
 #include "services/backwashd/in/odometry_check.hpp"
 #include "services/backwashd/in/other_daemons.hpp"
 #include "services/backwashd/in/pose_source.hpp"
+#include "services/backwashd/in/received.hpp"
 #include "services/backwashd/out/bound_writer.hpp"
 #include "services/backwashd/out/shown_battery.hpp"
 #include "services/backwashd/out/shown_transforms.hpp"
@@ -27,6 +28,8 @@
 #include "services/dds/writers.hpp"
 
 namespace backwash::daemon {
+
+struct Channels;
 
 /// The daemon's side of the DDS topics that flight depends on: odometry, loop closures and commands in, answers and
 /// status out (docs/interfaces.md); those with large samples are MapFront's. It has no Recorder, whose lock a thread of

@@ -8,7 +8,7 @@
 
 #include "core/config/daemon_config.hpp"
 #include "core/track/pose_velocity.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/in/received.hpp"
 #include "services/dds/topics.hpp"
 
 namespace backwash::daemon {

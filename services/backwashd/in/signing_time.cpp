@@ -16,6 +16,8 @@
 #include <thread>
 #include <utility>
 
+#include "services/backwashd/control/controlled.hpp"
+
 namespace backwash::daemon {
 namespace {
 
@@ -68,7 +70,7 @@ std::string signing_time_path(const std::string& log) {
   return (std::filesystem::path(log).parent_path() / "mavlink_signing.time").string();
 }
 
-void run_signing_time(SigningTimeFile& file, Channels& channels, const std::atomic<bool>& end) {
+void run_signing_time(SigningTimeFile& file, Controlled& channels, const std::atomic<bool>& end) {
   bool failing = false;
   while (!end) {
     const std::optional<SigningTime> last = channels.signing_time.load();

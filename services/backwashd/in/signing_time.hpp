@@ -7,9 +7,10 @@
 
 #include "firmware_bridge/mavlink/signing.hpp"
 #include "firmware_bridge/port/port.hpp"
-#include "services/backwashd/channels.hpp"
 
 namespace backwash::daemon {
+
+struct Controlled;
 
 /// Keeps the time of our signatures from going back over restarts, whatever the wall clock says: a file holds a time
 /// that is not reached before a later one is in it. After a crash the next start goes on there, up to kReserve early;
@@ -42,6 +43,6 @@ std::string signing_time_path(const std::string& log);
 
 /// Thread body, of a thread of its own because a disk may hang: keeps the file ahead of the link's signatures until
 /// `end`; a disk that does not take it is told once.
-void run_signing_time(SigningTimeFile& file, Channels& channels, const std::atomic<bool>& end);
+void run_signing_time(SigningTimeFile& file, Controlled& channels, const std::atomic<bool>& end);
 
 }  // namespace backwash::daemon

@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/in/localization.hpp"
 #include "services/backwashd/out/shown_segment.hpp"
 #include "services/backwashd/text.hpp"
@@ -61,6 +62,8 @@ MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& r
   if (!config.dds.security.empty()) silent_.emplace();
   if (window_) window_->add_to(waitset_);
 }
+
+MapFront::~MapFront() { channels_.worlds.reader.give_back(world_); }
 
 void MapFront::take_poses() {
   if (const auto shift = channels_.map_from_odom.read_new()) placement_.close(*shift);

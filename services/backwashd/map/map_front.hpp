@@ -6,11 +6,12 @@
 #include <string>
 
 #include "core/config/daemon_config.hpp"
-#include "services/backwashd/channels.hpp"
+#include "core/track/tracker.hpp"
 #include "services/backwashd/control/refusals.hpp"
 #include "services/backwashd/in/partial_watch.hpp"
 #include "services/backwashd/in/silent_writers.hpp"
 #include "services/backwashd/map/map_parts.hpp"
+#include "services/backwashd/map/mapped.hpp"
 #include "services/backwashd/map/scan_placement.hpp"
 #include "services/backwashd/map/window_front.hpp"
 #include "services/backwashd/out/bound_writer.hpp"
@@ -21,6 +22,8 @@
 #include "services/dds/writers.hpp"
 
 namespace backwash::daemon {
+
+struct Channels;
 
 /// The daemon's side of the DDS topics that carry large samples: maps and scans in, tube, trajectory, markers and the
 /// disturbance out. Its participant has sockets and threads of its own, of ordinary scheduling: whatever is sent here,
@@ -33,7 +36,7 @@ class MapFront {
   static constexpr std::size_t kMaxMapBytes = 48u << 20;  ///< larger maps are refused before they are copied
 
   MapFront(const config::Daemon& config, Channels& channels, Recorder& recorder);
-  ~MapFront() { channels_.worlds.reader.give_back(world_); }
+  ~MapFront();
   MapFront(const MapFront&) = delete;
   MapFront& operator=(const MapFront&) = delete;
 

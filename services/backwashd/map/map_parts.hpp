@@ -8,7 +8,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/map/mapped.hpp"
 #include "services/dds/topics.hpp"
 
 namespace backwash::daemon {

@@ -21,6 +21,7 @@
 #include "core/config/file_hash.hpp"
 #include "core/map/octomap/octomap_message.hpp"
 #include "core/reach/response/integrator.hpp"
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/map/map_change.hpp"
 #include "services/dds/dds.hpp"
 #include "services/parallel/parallel.hpp"
@@ -130,8 +131,9 @@ MapWorker::World MapWorker::made(const std::function<World()>& make) {
 
 MapWorker::World MapWorker::built(map::OccupancyGrid grid) {
   return made([&] {
-    auto world = plan::build_world(std::move(grid), model_, vehicle_, reach::Method::tight, std::nullopt, parallel_);
-    return air_ ? plan::with_air(*world, *air_, model_, parallel_) : world;
+    const map::VoxelBox all = map::all_of(grid.size());
+    return plan::rebuilt(plan::unbuilt_world(std::move(grid), model_, vehicle_), {.voxels = all, .air = air_},
+                         parallel_);
   });
 }
 
@@ -160,11 +162,8 @@ void MapWorker::use(const MapMessage& message, map::OccupancyGrid whole) {
   const auto seen_ns = heard_ns_;
   const bool update = world_ && same_place(world_->grid, live_->grid());
   if (update) {
-    const map::VoxelBox changed = difference(world_->grid, live_->grid());
-    publish(made([&, grid = live_->grid()]() mutable {
-              return plan::update_world(*world_, std::move(grid), changed, model_, parallel_);
-            }),
-            seen_ns);
+    plan::Change change{.grid = live_->grid(), .voxels = difference(world_->grid, live_->grid())};
+    publish(made([&] { return plan::rebuilt(*world_, std::move(change), parallel_); }), seen_ns);
   } else {
     map::OccupancyGrid copy = live_->grid();
     if (!world_) publish_near(copy, seen_ns);  // what flies in another world is not cut short
@@ -198,7 +197,10 @@ void MapWorker::publish_near(const map::OccupancyGrid& grid, std::int64_t seen_n
   const map::VoxelBox columns{(v - Index3(by, by, v.z())).cwiseMax(0), (v + Index3(by, by, last.z())).cwiseMin(last)};
   const Index3 extent = columns.high - columns.low + Index3::Ones();
   if (static_cast<std::size_t>(extent.prod()) * kWorthIt > grid.cell_count()) return;
-  auto near = made([&] { return plan::build_part(grid, columns, model_, vehicle_, parallel_); });
+  auto near = made([&] {
+    return plan::rebuilt(plan::unbuilt_world(map::part_of(grid, columns), model_, vehicle_),
+                         {.voxels = map::all_of(extent), .around = &grid}, parallel_);
+  });
   channels_.map_partial = true;
   publish(std::move(near), seen_ns);
   spdlog::info("map: {:.0f} m around the vehicle can be flown after {} ms, the rest follows", kMadeFirst,
@@ -215,7 +217,7 @@ bool MapWorker::take_air() {
   if (covers(world_->air.factors, *air_) && !(fell && *air_ != world_->air.factors)) return false;
   const auto begun = now_ns();
   const std::int64_t seen_ns = channels_.map_ns.load().value_or(begun);
-  publish(made([&] { return plan::with_air(*world_, *air_, model_, parallel_); }), seen_ns);
+  publish(made([&] { return plan::rebuilt(*world_, {.air = air_}, parallel_); }), seen_ns);
   const char* const what = !fell ? "rougher" : *std::ranges::min_element(*air_) < 1 ? "calmer" : "reset";
   std::string line = "air";
   for (std::size_t k = 0; k < kAirClasses; ++k)
@@ -430,7 +432,7 @@ bool MapWorker::take_news() {
     const auto update = [&, grid = live_->grid()] {
       World world = world_;
       for (const map::VoxelBox& box : boxes)
-        if (!box.empty()) world = plan::update_world(*world, grid, box, model_, parallel_);
+        if (!box.empty()) world = plan::rebuilt(*world, {.grid = grid, .voxels = box}, parallel_);
       return world;
     };
     publish(made(update), seen_ns);

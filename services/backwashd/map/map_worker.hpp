@@ -8,12 +8,14 @@
 #include "core/map/scan/scan.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/map/mapped.hpp"
 #include "services/backwashd/map/window_keeper.hpp"
 #include "services/backwashd/plan/lookout.hpp"
 #include "services/backwashd/record/recorder.hpp"
 
 namespace backwash::daemon {
+
+struct Channels;
 
 /// Turns maps and scans into immutable worlds (grid, distance, field, bounds, hover map). What they say is not free any
 /// more goes to the control thread before a world is made of it, by place, whatever extent a map has; what comes while

@@ -8,7 +8,7 @@
 #include <tl/expected.hpp>
 
 #include "core/config/daemon_config.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/in/received.hpp"
 #include "services/backwashd/map/cloud.hpp"
 
 namespace backwash::daemon {

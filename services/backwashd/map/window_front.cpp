@@ -7,9 +7,9 @@
 
 namespace backwash::daemon {
 
-WindowFront::WindowFront(const config::Daemon& config, const dds::Participant& participant, Channels& channels,
+WindowFront::WindowFront(const config::Daemon& config, const dds::Participant& participant, Mapped& mapped,
                          Recorder& recorder)
-    : channels_(channels), recorder_(recorder), clouds_(config) {
+    : mapped_(mapped), recorder_(recorder), clouds_(config) {
   const config::MapWindow& window = config.map.window;
   for (const bool free : {false, true}) {
     const std::string& topic = free ? window.free : window.occupied;
@@ -34,7 +34,7 @@ void WindowFront::add_to(std::vector<const dds::detail::ReaderBase*>& readers) c
 void WindowFront::take(Kind& kind, const map::OccupancyGrid* known, const std::optional<Vec3>& vehicle_W,
                        Refusals& refusals) {
   const auto refuse = [&](auto&& why) {
-    ++channels_.scans_rejected;
+    ++mapped_.scans_rejected;
     refusals.add(*kind.rejected, why);
   };
   kind.reader.take([&](const dds::PointCloud& m, const dds::Guid& writer) {
@@ -47,13 +47,13 @@ void WindowFront::take(Kind& kind, const map::OccupancyGrid* known, const std::o
     if (known && !kind.free) {
       const NewVoxels voxels = new_voxels(*known, *cloud);
       fresh = voxels.count;
-      if (fresh > 0) channels_.scan_voxels.push_or_count(voxels);
+      if (fresh > 0) mapped_.scan_voxels.push_or_count(voxels);
     }
     recorder_.append(log::RecordKind::scan, std::string(kind.free ? "free" : "occupied") + " window of " +
                                                 std::to_string(cloud->voxels.size()) + " voxels, " +
                                                 std::to_string(fresh) + " new voxels");
     auto owned = std::make_unique<WindowCloud>(std::move(*cloud));
-    if (channels_.windows.push(owned.get()))
+    if (mapped_.windows.push(owned.get()))
       static_cast<void>(owned.release());  // the ring holds it
     else
       refuse([&] { return kind.reader.topic() + ": the map worker has 16 clouds waiting"; });

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "services/backwashd/channels.hpp"
 #include "services/backwashd/control/refusals.hpp"
+#include "services/backwashd/map/mapped.hpp"
 #include "services/backwashd/map/window_clouds.hpp"
 #include "services/backwashd/out/bound_writer.hpp"
 #include "services/backwashd/record/recorder.hpp"
@@ -16,8 +16,7 @@ namespace backwash::daemon {
 /// The topics of a mapper's window: each is taken from one writer. Used by the map reader's thread.
 class WindowFront {
  public:
-  WindowFront(const config::Daemon& config, const dds::Participant& participant, Channels& channels,
-              Recorder& recorder);
+  WindowFront(const config::Daemon& config, const dds::Participant& participant, Mapped& mapped, Recorder& recorder);
   void add_to(dds::WaitSet& waitset) const;
   void add_to(std::vector<const dds::detail::ReaderBase*>& readers) const;
   /// Occupied voxels that are free in `known`, the newest snapshot's grid or null, go straight to the control thread,
@@ -33,7 +32,7 @@ class WindowFront {
   };
   void take(Kind& kind, const map::OccupancyGrid* known, const std::optional<Vec3>& vehicle_W, Refusals& refusals);
 
-  Channels& channels_;
+  Mapped& mapped_;
   Recorder& recorder_;
   WindowClouds clouds_;
   std::vector<Kind> kinds_;

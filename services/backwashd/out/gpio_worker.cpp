@@ -6,6 +6,7 @@
 #include <thread>
 #include <utility>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/control/switch_reaction.hpp"
 #include "services/parallel/real_time.hpp"
 

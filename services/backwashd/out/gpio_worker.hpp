@@ -5,9 +5,11 @@
 
 #include "core/config/daemon_config.hpp"
 #include "firmware_bridge/gpio/line.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/control/controlled.hpp"
 
 namespace backwash::daemon {
+
+struct Channels;
 
 /// The lines of the [gpio] table. Their driver may wait (an I²C expander for its bus, for milliseconds), so that the
 /// control thread never touches them: it leaves its tick count in an atomic and reads the switch's state from one. The

@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/out/shown_segment.hpp"
 #include "services/backwashd/text.hpp"
 #include "services/dds/air_text.hpp"

@@ -6,11 +6,13 @@
 #include <vector>
 
 #include "core/types/vehicle.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/control/controlled.hpp"
 #include "services/backwashd/control/doubts.hpp"
 #include "services/dds/topics.hpp"
 
 namespace backwash::daemon {
+
+struct Channels;
 
 /// The status of one moment, with all that its message points to.
 class ShownStatus {

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "core/config/file_hash.hpp"
+#include "services/backwashd/control/controlled.hpp"
 #include "services/command_line/exit_code.hpp"
 
 namespace backwash::daemon {
@@ -94,7 +95,7 @@ bool AirFile::keep(const AirFactors& factors) const {
   return false;
 }
 
-void run_air_file(const AirFile& file, Channels& channels, const std::atomic<bool>& end) {
+void run_air_file(const AirFile& file, Controlled& channels, const std::atomic<bool>& end) {
   std::optional<AirFactors> newest;
   bool failing = false;
   for (bool last = false; !last; std::this_thread::sleep_for(std::chrono::milliseconds(last ? 0 : 200))) {

@@ -4,9 +4,11 @@
 #include <atomic>
 #include <string>
 
-#include "services/backwashd/channels.hpp"
+#include "core/types/air_class.hpp"
 
 namespace backwash::daemon {
+
+struct Controlled;
 
 /// Keeps what flights have learnt of their air over restarts: the factors by class, for the vehicle and model file that
 /// they were learnt with. A file takes the place of the one before when it is whole. Nothing here is real-time.
@@ -29,6 +31,6 @@ class AirFile {
 
 /// Thread body, of a thread of its own because a disk may hang: keeps each set of factors that the control thread hands
 /// over until `end`; a disk that does not take them is told once.
-void run_air_file(const AirFile& file, Channels& channels, const std::atomic<bool>& end);
+void run_air_file(const AirFile& file, Controlled& channels, const std::atomic<bool>& end);
 
 }  // namespace backwash::daemon

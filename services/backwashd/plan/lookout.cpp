@@ -60,7 +60,7 @@ class Lookout::Runs {
 bool Lookout::late(const track::FlightTick& flight, std::int64_t now_ns) const noexcept {
   const auto& tracker = flight.tracker();
   if (!map_.live || tracker.finished()) return false;
-  const std::optional<double> age = channels_.map_age(now_ns);
+  const std::optional<double> age = mapped_.map_age(now_ns);
   const bool lifted = flight.mode() == Mode::lifting;
   return !age || *age > kLate || (!lifted && map_.closing_speed * *age > tracker.clearance());
 }
@@ -122,10 +122,10 @@ bool Lookout::catch_up(std::size_t end, std::int64_t seen_ns, const Ahead& ahead
 
 void Lookout::take_new(std::int64_t now_ns) noexcept {
   const auto keep = [&](const NewVoxels& voxels) { recent_[recorded_++ % kKept] = voxels; };
-  for (auto* ring : {&channels_.scan_voxels, &channels_.map_voxels})
+  for (auto* ring : {&mapped_.scan_voxels, &mapped_.map_voxels})
     for (std::size_t n = 0; n < kRecordsInTick; ++n)
       if (const auto voxels = ring->pop()) keep(*voxels);
-  const std::uint64_t lost = channels_.scan_voxels.lost() + channels_.map_voxels.lost();
+  const std::uint64_t lost = mapped_.scan_voxels.lost() + mapped_.map_voxels.lost();
   if (std::exchange(lost_, lost) != lost) {
     constexpr double kEverywhere = 1e9;  // m
     keep({now_ns, kEverywhere, 1});
@@ -133,8 +133,8 @@ void Lookout::take_new(std::int64_t now_ns) noexcept {
 }
 
 track::Surroundings Lookout::look(const track::FlightTick& flight, std::int64_t now_ns) noexcept {
-  if (const auto* newest = channels_.worlds.control.take())
-    channels_.worlds.control.give_back(std::exchange(world_, newest));
+  if (const auto* newest = mapped_.worlds.control.take())
+    mapped_.worlds.control.give_back(std::exchange(world_, newest));
   track::Surroundings result;
   result.missing = world_ == nullptr;
   const auto& tracker = flight.tracker();
@@ -161,8 +161,8 @@ track::Surroundings Lookout::look(const track::FlightTick& flight, std::int64_t 
   }
   // The planner has found that the newest snapshot does not leave the flight clear.
   const bool goes_on = segment_ != 0 && !tracker.finished() && !tracker.braking();
-  if (goes_on && channels_.blocked_segment.load(std::memory_order_relaxed) == segment_) result.tube_blocked = true;
-  result.rougher = goes_on && channels_.rough_segment.load(std::memory_order_relaxed) == segment_;
+  if (goes_on && planned_.blocked_segment.load(std::memory_order_relaxed) == segment_) result.tube_blocked = true;
+  result.rougher = goes_on && planned_.rough_segment.load(std::memory_order_relaxed) == segment_;
   return result;
 }
 

@@ -6,7 +6,8 @@
 #include "core/config/daemon_config.hpp"
 #include "core/track/flight_tick.hpp"
 #include "core/types/vehicle.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/map/mapped.hpp"
+#include "services/backwashd/plan/planned.hpp"
 
 namespace backwash::daemon {
 
@@ -16,10 +17,10 @@ using MapSettings = decltype(config::Daemon::map);
 /// at the newest snapshot and, before any snapshot holds them, at the voxels that a scan has just found occupied.
 class Lookout {
  public:
-  Lookout(Channels& channels, const Vehicle& vehicle, const MapSettings& map)
-      : channels_(channels), map_(map), taken_(vehicle.body.radius + vehicle.estimation.position) {}
+  Lookout(Mapped& mapped, const Planned& planned, const Vehicle& vehicle, const MapSettings& map)
+      : mapped_(mapped), planned_(planned), map_(map), taken_(vehicle.body.radius + vehicle.estimation.position) {}
 
-  ~Lookout() { channels_.worlds.control.give_back(world_); }
+  ~Lookout() { mapped_.worlds.control.give_back(world_); }
   Lookout(const Lookout&) = delete;
   Lookout& operator=(const Lookout&) = delete;
 
@@ -45,7 +46,8 @@ class Lookout {
   void take_new(std::int64_t now_ns) noexcept;
   void hold_against(const NewVoxels& voxels, const Ahead& ahead, track::Surroundings& result) const noexcept;
 
-  Channels& channels_;
+  Mapped& mapped_;
+  const Planned& planned_;
   MapSettings map_;
   double taken_;  // by the body
   const Snapshot* world_ = nullptr;

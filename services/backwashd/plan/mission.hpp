@@ -8,9 +8,12 @@
 #include <span>
 #include <string>
 
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/control/controlled.hpp"
+#include "services/backwashd/plan/planned.hpp"
 
 namespace backwash::daemon {
+
+struct Channels;
 
 /// What a station is told of its command: an ACK_… code of idl/backwash_msgs.idl and one line.
 struct Answer {

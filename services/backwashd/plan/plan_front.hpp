@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "core/track/tracker.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/control/controlled.hpp"
 
 namespace backwash::daemon {
 

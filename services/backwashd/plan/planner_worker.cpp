@@ -21,6 +21,7 @@
 #include "core/types/angle.hpp"
 #include "core/types/minimum_jerk.hpp"
 #include "core/types/text.hpp"
+#include "services/backwashd/channels.hpp"
 
 namespace backwash::daemon {
 namespace {

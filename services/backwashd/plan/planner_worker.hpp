@@ -7,12 +7,15 @@
 #include <string>
 
 #include "core/plan/replan.hpp"
-#include "services/backwashd/channels.hpp"
 #include "services/backwashd/control/flying.hpp"
+#include "services/backwashd/map/mapped.hpp"
 #include "services/backwashd/plan/plan_front.hpp"
+#include "services/backwashd/plan/planned.hpp"
 #include "services/backwashd/record/recorder.hpp"
 
 namespace backwash::daemon {
+
+struct Channels;
 
 /// Called with each segment that the control thread accepted.
 using SegmentAccepted = std::function<void(const track::AcceptedSegment&)>;

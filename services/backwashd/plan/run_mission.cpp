@@ -6,6 +6,7 @@
 #include <thread>
 #include <vector>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/plan/mission.hpp"
 #include "services/dds/topics.hpp"
 

@@ -17,6 +17,8 @@
 #include <thread>
 #include <utility>
 
+#include "services/backwashd/channels.hpp"
+
 namespace backwash::daemon {
 namespace {
 

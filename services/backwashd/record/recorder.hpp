@@ -13,9 +13,11 @@
 
 #include "core/log/mcap/mcap_flight.hpp"
 #include "firmware_bridge/port/port.hpp"
-#include "services/backwashd/channels.hpp"
+#include "services/backwashd/record/control_record.hpp"
 
 namespace backwash::daemon {
+
+struct Channels;
 
 /// Writes the raw log as MCAP (core/log/mcap/mcap_flight.hpp) from its own thread: the real-time threads' rings, and
 /// what the other threads append. A full disk, a vanished directory or a disk that does not answer costs records and

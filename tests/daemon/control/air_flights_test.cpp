@@ -45,7 +45,7 @@ std::shared_ptr<const plan::World> world_of(const Course& course) {
   auto& world = known[course.scene];
   if (!world) {
     world = plan::build_world(grid_of(course), Model{}, vehicle_5in());
-    world = plan::with_air(*world, kModelledAir, Model{});
+    world = plan::rebuilt(*world, {.air = kModelledAir});
   }
   return world;
 }

@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "services/backwashd/channels.hpp"
 #include "tests/daemon/lockstep/lockstep.hpp"
 
 namespace backwash::daemon {

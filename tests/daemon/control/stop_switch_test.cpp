@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // docs/faults.md row 37: what the daemon makes of its stop switch, from the reading that the GPIO thread leaves to the
 // wire.
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/out/gpio_worker.hpp"
 #include "tests/daemon/plan/mission_rig.hpp"
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <random>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/control/link_watch.hpp"
 #include "tests/bridge/pseudo_terminal.hpp"
 #include "tests/daemon/lockstep/heartbeats.hpp"

@@ -11,6 +11,7 @@
 #include <random>
 
 #include "core/map/octomap/octomap_message.hpp"
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/map/map_worker.hpp"
 #include "tests/daemon/lockstep/lockstep.hpp"
 

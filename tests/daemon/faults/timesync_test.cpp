@@ -7,6 +7,7 @@
 
 #include <thread>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/control/control_loop.hpp"
 #include "services/parallel/real_time.hpp"
 #include "tests/daemon/lockstep/lockstep.hpp"

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <memory>
 #include <thread>
+#include "services/backwashd/channels.hpp"
 
 namespace backwash::daemon {
 namespace {

@@ -31,7 +31,7 @@ struct LearningRig : Lockstep {
   }
   /// The corridor with the classes of its air.
   static std::shared_ptr<const plan::World> known_air() {
-    static const auto world = plan::with_air(*corridor(), kModelledAir, Model{});
+    static const auto world = plan::rebuilt(*corridor(), {.air = kModelledAir});
     return world;
   }
   double largest_factor() const { return view().air ? *std::ranges::max_element(view().air->factors) : 1; }

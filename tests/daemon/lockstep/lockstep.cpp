@@ -15,6 +15,7 @@
 #include "core/sim/flight.hpp"
 #include "core/types/minimum_jerk.hpp"
 #include "firmware_bridge/mavlink/frames.hpp"
+#include "services/backwashd/channels.hpp"
 #include "tests/daemon/lockstep/lockstep_line.hpp"
 #include "tests/daemon/lockstep/traps.hpp"
 

@@ -10,6 +10,7 @@
 #include "core/log/raw/raw_log.hpp"
 #include "core/sim/vehicle/vio.hpp"
 #include "firmware_bridge/mavlink/messages.hpp"
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/control/control_loop.hpp"
 #include "services/bench/emulation/autopilot.hpp"
 

@@ -6,6 +6,7 @@
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 #include "core/plan/stop.hpp"
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/plan/lookout.hpp"
 
 /// Faults of the map in lockstep: the control thread's decision and its lookout, with a vehicle that follows perfectly.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Faults of the map itself and of its frame (docs/faults.md rows 4, 9, 10 and 13).
 #include "tests/daemon/map/map_faults.hpp"
+#include "services/backwashd/channels.hpp"
 
 namespace backwash::daemon {
 namespace {

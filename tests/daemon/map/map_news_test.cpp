@@ -5,6 +5,7 @@
 #include <chrono>
 #include <thread>
 
+#include "services/backwashd/channels.hpp"
 #include "tests/daemon/map/map_window_rig.hpp"
 
 namespace backwash::daemon {

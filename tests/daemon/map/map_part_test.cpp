@@ -5,6 +5,7 @@
 #include <optional>
 #include <thread>
 
+#include "services/backwashd/channels.hpp"
 #include "tests/daemon/map/map_worker_rig.hpp"
 
 namespace backwash::daemon {

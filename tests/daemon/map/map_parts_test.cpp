@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/map/map_front.hpp"
 #include "tests/daemon/map/map_in_parts.hpp"
 

@@ -13,6 +13,7 @@
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
 #include "core/map/octomap/octomap_message.hpp"
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/map/map_worker.hpp"
 
 namespace backwash::daemon {

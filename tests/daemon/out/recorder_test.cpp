@@ -16,6 +16,7 @@
 #include <type_traits>
 
 #include "core/log/raw/raw_log.hpp"
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/control/control_loop.hpp"
 #include "services/backwashd/in/dds_front.hpp"
 #include "tests/daemon/lockstep/traps.hpp"

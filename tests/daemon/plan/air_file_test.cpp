@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "core/config/file_hash.hpp"
+#include "services/backwashd/channels.hpp"
 #include "services/command_line/exit_code.hpp"
 
 namespace backwash::daemon {

@@ -11,6 +11,7 @@
 #include <random>
 
 #include "core/reach/clearance.hpp"
+#include "services/backwashd/channels.hpp"
 
 namespace backwash::daemon {
 namespace {
@@ -28,7 +29,7 @@ Vehicle vehicle() {
 struct LongFlight {
   std::unique_ptr<Channels> channels = std::make_unique<Channels>();
   track::FlightTick flight{vehicle(), 0};
-  Lookout lookout{*channels, vehicle(), {}};
+  Lookout lookout{*channels, *channels, vehicle(), {}};
   track::AcceptedSegment segment;
   track::TickInput in;
 
@@ -227,7 +228,7 @@ TEST(Lookout, ALiveMapThatNeverCameIsLateFromTheClocksFirstSecondOn) {
   LongFlight f(3000, 1);  // clear by more than anything could have come nearer
   MapSettings live;
   live.live = true;
-  Lookout lookout(*f.channels, vehicle(), live);
+  Lookout lookout(*f.channels, *f.channels, vehicle(), live);
   ASSERT_EQ(f.channels->map_ns.load(), std::nullopt);
   for (const std::int64_t now : {std::int64_t{20'000'000}, f.in.now_ns}) EXPECT_TRUE(lookout.look(f.flight, now).late);
 }
@@ -238,7 +239,7 @@ TEST(Lookout, AClosingObstacleHasWhatTheFramesLeaveOfTheClearanceAlone) {
     MapSettings live;
     live.live = true;
     live.closing_speed = 0.5;
-    Lookout lookout(*f.channels, vehicle(), live);
+    Lookout lookout(*f.channels, *f.channels, vehicle(), live);
     f.channels->map_ns.store(f.in.now_ns - 400'000'000);
     EXPECT_EQ(lookout.look(f.flight, f.in.now_ns).late, apart);
   }

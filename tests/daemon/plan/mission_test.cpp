@@ -3,6 +3,7 @@
 // 48).
 #include <thread>
 
+#include "services/backwashd/channels.hpp"
 #include "tests/daemon/plan/mission_rig.hpp"
 
 namespace backwash::daemon::test {

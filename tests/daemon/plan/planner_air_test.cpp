@@ -130,7 +130,7 @@ TEST_F(PlannerWatch, AFlightIsStillVerifiedWhileItMayNotBeExtendedInCalmerAir) {
   fly_past(1.4, {0.3, 0.3, 0.3, 0.3, 1});
   view_.air->factors = kModelledAir;
   show();
-  world_ = plan::with_air(*world_of(walled(3.8, true)), {0.3, 0.3, 0.3, 0.3, 1}, Model{});
+  world_ = plan::rebuilt(*world_of(walled(3.8, true)), {.air = AirFactors{0.3, 0.3, 0.3, 0.3, 1}});
   channels_->worlds.offer({world_, kSeen_ns + 2});
   planner_.step();
   EXPECT_EQ(offers_.size(), 1u) << "nothing new";
@@ -169,7 +169,7 @@ TEST_F(PlannerWatch, StopsAreNotRenewedInAWorldThatIsTooCalmItself) {
   fly_past(1.4, {0.3, 0.3, 0.3, 0.3, 1});
   view_.air->factors = kModelledAir;
   show();
-  world_ = plan::with_air(*world_, {0.5, 0.5, 0.5, 0.5, 1}, Model{});
+  world_ = plan::rebuilt(*world_, {.air = AirFactors{0.5, 0.5, 0.5, 0.5, 1}});
   channels_->worlds.offer({world_, kSeen_ns + 1});
   planner_.step();
   EXPECT_EQ(offers_.size(), 1u);
@@ -228,7 +228,8 @@ TEST_F(PlannerWatch, AnObstacleInAirThatWasRoughBeforeIsAnObstacle) {
   fly_past(1.4);
   learn({1.2, 1.2, 1.2, 1.2, 1});
   planner_.step();
-  world_ = plan::with_air(*world_of(walled(view_.state.p_W.x() + 0.6, false)), {1.2, 1.2, 1.2, 1.2, 1}, Model{});
+  world_ =
+      plan::rebuilt(*world_of(walled(view_.state.p_W.x() + 0.6, false)), {.air = AirFactors{1.2, 1.2, 1.2, 1.2, 1}});
   channels_->worlds.offer({world_, kSeen_ns + 2});
   planner_.step();
   EXPECT_FALSE(rough());

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/plan/planner_worker.hpp"
 #include "tests/daemon/lockstep/lockstep.hpp"
 

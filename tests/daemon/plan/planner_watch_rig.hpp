@@ -43,7 +43,7 @@ class PlannerWatch : public PlannerOffers {
   bool rough() const { return channels_->rough_segment != 0; }
   /// The same map, in air that is rougher by these factors.
   void learn(const AirFactors& factors) {
-    world_ = plan::with_air(*world_, factors, Model{});
+    world_ = plan::rebuilt(*world_, {.air = factors});
     channels_->worlds.offer({world_, kSeen_ns + 1});
     view_.air.emplace().factors = factors;
     view_.air->ln_evidence.fill(7.25);

@@ -10,6 +10,7 @@
 #include "core/log/raw/tick_log.hpp"
 #include "core/map/load_map.hpp"
 #include "core/map/octomap/octomap_message.hpp"
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/control/switch_reaction.hpp"
 
 namespace backwash::fuzz {

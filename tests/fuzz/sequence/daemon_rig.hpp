@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "services/backwashd/channels.hpp"
 #include "services/backwashd/in/localization.hpp"
 #include "services/backwashd/map/map_worker.hpp"
 #include "services/backwashd/map/scan_placement.hpp"

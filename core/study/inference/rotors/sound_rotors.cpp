@@ -66,7 +66,7 @@ std::optional<SoundRotors> sound_rotors(const Observations& reference) {
   return sound;
 }
 
-std::optional<double> settle_rotors(const std::optional<SoundRotors>& sound, Observations& seen) {
+SettledRotors settle_rotors(const std::optional<SoundRotors>& sound, Observations seen) {
   double unjudged = 0;
   const bool shaking = !sound && shakes(seen);
   for (const std::size_t first : {std::size_t{kMotor1}, std::size_t{kRpm1}}) {
@@ -84,7 +84,7 @@ std::optional<double> settle_rotors(const std::optional<SoundRotors>& sound, Obs
     for (std::size_t r = 0; r < kRotors; ++r)
       for (double& y : seen.y[first + r]) y -= own[r];
   }
-  return unjudged > kRules.motor_scatter ? std::optional(unjudged) : std::nullopt;
+  return {std::move(seen), unjudged > kRules.motor_scatter ? std::optional(unjudged) : std::nullopt};
 }
 
 bool YawBalance::weight() const { return std::abs(yaw) <= kRotorRules.balance_errors * error; }
@@ -99,7 +99,7 @@ YawBalance yaw_balance(const std::array<double, 4>& ln_thrust, double spread) {
   return {2 * (thrust[3] + thrust[0]) / sum - 1, spread / 2, (thrust[3] - (sum - thrust[3]) / 3) / sum};
 }
 
-void name_by_balance(Accepted& cause, const Observations& rest, bool taken_out, double spread) {
+Accepted name_by_balance(Accepted cause, const Observations& rest, bool taken_out, double spread) {
   std::array<double, kRotors> ln{};
   bool motors = false, own_line = false;
   for (std::size_t k = 0; k < cause.columns.size(); ++k)
@@ -107,7 +107,7 @@ void name_by_balance(Accepted& cause, const Observations& rest, bool taken_out, 
       motors = motors || (channel >= kMotor1 && channel <= kMotor4);
       own_line = own_line || (channel >= kLine1 && channel <= kLine4 && cause.parameters[k].low > 0);
     }
-  if (!motors || own_line) return;
+  if (!motors || own_line) return cause;
   double windows = 0;
   for (std::size_t i = 0; i < rest.windows.size(); ++i) {
     std::array<double, kRotors> added{};
@@ -130,12 +130,12 @@ void name_by_balance(Accepted& cause, const Observations& rest, bool taken_out, 
   const bool is_weight = cause.form->effect == weight->effect;
   const bool sure = balance.weight() != balance.propeller() && balance.weight() == is_weight;
   std::erase_if(cause.rivals, [&](auto& r) { return r.form->effect == propeller->effect || r.form == weight; });
-  if (sure) return;
   const Form* other = is_weight ? propeller : weight;
-  cause.rivals.push_back({other->cause(), other, other->scales.front(), 0});
+  if (!sure) cause.rivals.push_back({other->cause(), other, other->scales.front(), 0});
+  return cause;
 }
 
-void tell_shares(Accepted& cause) {
+Accepted tell_shares(Accepted cause) {
   for (std::size_t k = 0; k < cause.columns.size(); ++k) {
     const Channel c = cause.columns[k].parts.front().channel;
     if (c < kMotor1 || c > kRpm4) continue;
@@ -143,6 +143,7 @@ void tell_shares(Accepted& cause) {
     Estimate& e = cause.parameters[k];
     for (double* x : {&e.value, &e.low, &e.high}) *x = pair ? std::tanh(*x) : std::expm1(*x);
   }
+  return cause;
 }
 
 }  // namespace backwash::study

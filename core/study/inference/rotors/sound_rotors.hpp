@@ -23,8 +23,11 @@ std::optional<SoundRotors> sound_rotors(const Observations& reference);
 /// Takes the sound craft's own differences out of observations: as told by reference flights, or, without them, all
 /// that a sound craft may have (rotor_spread). What is larger stays, and the shares of a craft of which one rotor
 /// shakes.
-/// Returns by how much the rotors' shares differ without that being judged, ln, if they do.
-std::optional<double> settle_rotors(const std::optional<SoundRotors>& sound, Observations& seen);
+struct SettledRotors {
+  Observations seen;
+  std::optional<double> unjudged;  ///< by how much the rotors' shares differ without that being judged, ln
+};
+SettledRotors settle_rotors(const std::optional<SoundRotors>& sound, Observations seen);
 
 /// Commanded thrusts against two patterns: a propeller that gives less twists the craft, a weight beside the middle
 /// does not.
@@ -41,10 +44,10 @@ YawBalance yaw_balance(const std::array<double, 4>& ln_thrust, double spread);
 /// What a cause that was told of the motors' commands may be called: both names unless the rotor's own line or the yaw
 /// balance tells them apart. Changes the rivals of such a cause, and no other's. `seen`: observations; `taken_out`:
 /// without this cause.
-void name_by_balance(Accepted& cause, const Observations& seen, bool taken_out, double spread);
+Accepted name_by_balance(Accepted cause, const Observations& seen, bool taken_out, double spread);
 
 /// Motor and rpm channels hold logarithms: parameters that were fitted there become the shares that their names say,
 /// e^θ − 1 of one rotor, tanh θ of two that face each other. −1 is a rotor that gives nothing.
-void tell_shares(Accepted& cause);
+Accepted tell_shares(Accepted cause);
 
 }  // namespace backwash::study
