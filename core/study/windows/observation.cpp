@@ -165,8 +165,7 @@ WindowRow Observer::placed(const log::FlightLog& log, const Series& s, SampleRan
   const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kWindowRules.stray;
   const auto &p = as_told ? s.p_nominal : s.p, &v = as_told ? s.v_nominal : s.v;
   row.p_W = mean_of(p), row.v_W = mean_of(v);
-  const auto& kp = vehicle_.controller.kp;
-  row.give = as_told ? Vec3(1 / kp.horizontal, 1 / kp.horizontal, 1 / kp.vertical) : Vec3(Vec3::Zero());
+  row.give = as_told ? Vec3(loop::PositionLoop(vehicle_).kp.cwiseInverse()) : Vec3(Vec3::Zero());
   row.held_off = vehicle_.controller.velocity_integrator.horizontal > 0;
   if (as_told) row.slowed = (row.v_W - mean_of(s.v_dragged)) / kWindowRules.loop_drag;
   const auto varied2 = [&](const std::vector<Vec3>& x) {
