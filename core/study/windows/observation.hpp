@@ -1,25 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
-#include "core/log/columns/flight_log.hpp"
-#include "core/map/occupancy_grid.hpp"
 #include "core/study/windows/gates/gate.hpp"
 #include "core/study/windows/gates/window_rules.hpp"
-#include "core/study/windows/signals/instrument.hpp"
-#include "core/study/windows/signals/rotor_channels.hpp"
-#include "core/study/windows/signals/series.hpp"
-#include "core/study/windows/signals/texture.hpp"
-#include "core/study/windows/stretch.hpp"
+#include "core/study/windows/signals/signals.hpp"
 #include "core/study/windows/surroundings.hpp"
-#include "core/types/model.hpp"
-#include "core/types/vehicle.hpp"
 
 namespace backwash::study {
 
@@ -56,6 +48,12 @@ enum Channel : std::size_t {
   kChannels
 };
 const char* channel_name(Channel c);
+
+/// Value of a channel in one window.
+struct ChannelValue {
+  std::size_t channel;
+  double value, weight;
+};
 
 /// What flights must hold for an effect to be tested: a map, or something above said by map or log; columns of the log.
 enum class Source : std::size_t {
@@ -142,68 +140,6 @@ struct Observations {
   bool measured(Channel c) const;
   /// Units of neighbouring flights with the same value, one a flight.
   void group(const std::vector<double>& by_flight);
-};
-
-/// What an Observer keeps of flights until it is asked: of one flight, all that a study needs of its log. Nothing of
-/// one flight depends on another's, so flights may be looked at anywhere and put together in their order.
-struct Observed {
-  /// Σ z (level, rate)/√Σz² of a window, z the instrument of the delay and that of the slope; their means; its part of
-  /// the first stage.
-  struct ThrustMoments {
-    std::size_t window;
-    std::array<double, 2> delay{}, slope{}, mean{};  // mean: not an instrument's, of the window
-    FirstStage stage{};
-  };
-  Observations seen;
-  std::vector<ThrustMoments> thrust;
-  std::array<DelayStage, 2> command;  ///< level, vertical
-  DelayStage tilt;
-  std::vector<Fourth> tails;   ///< of every window
-  std::set<std::string> ever;  ///< columns that some flight had
-  bool strayed = false;        ///< some flight had set-points that it did not follow
-};
-
-/// Adds a flight to the observations (gates, windows, channels). `grid` and `model` may be null: then no surfaces are
-/// known but the floor at z = 0, and Σ = Σ_0. Real-time status: offline.
-class Observer {
- public:
-  Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid);
-  /// With surroundings that were looked at before, and are kept: studies of the same map share them.
-  Observer(const Vehicle& vehicle, MapView& surroundings);
-  Observer(const Observer&) = delete;
-  void add(const log::FlightLog& log);
-  /// Room for so many windows more: without it the vectors grow by doubling, and hold twice what is seen.
-  void expect(std::size_t windows);
-  /// Flights that another Observer of the same vehicle, model and map looked at, behind these.
-  void add(Observed flights);
-  /// Of the flights so far; none are left here.
-  Observed take();
-  Observations finish();
-  /// As finish() would tell it now; more flights may be added.
-  Observations so_far() const;
-
- private:
-  void add_windows(const log::FlightLog& log, const Series& s, const RotorPhases& rotors,
-                   const std::vector<SampleRange>& good);
-  /// Why the map leaves a window out: far outside of it, or in a solid (map and log contradict each other).
-  std::optional<Gate> misplaced(const Series& s, SampleRange w) const;
-  WindowRow placed(const log::FlightLog& log, const Series& s, SampleRange w);
-  void look_along(WindowRow& row, SampleRange w, const std::vector<Vec3>& p, const std::vector<Vec3>& v);
-  Residual put_means(const WindowRow& row, const Series& s, SampleRange w);
-  void put_delays(const Series& s, SampleRange w);
-  void put_command_delay(const Series& s, SampleRange w, int from, int to);
-  void put_tilt_delay(const Series& s, SampleRange w);
-  void put_spreads(const std::vector<Residual>& residuals, double rate_hz);
-  void put(std::size_t channel, double y, double weight);
-  void smooth_voltage();
-  void follow_thrust();
-  void settle_commands();
-  void put_tails();
-
-  const Vehicle vehicle_;
-  Observed all_;
-  std::optional<MapView> own_;
-  MapView& surroundings_;
 };
 
 }  // namespace backwash::study

@@ -9,6 +9,7 @@
 #include "core/map/occupancy_grid.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/inference/evidence.hpp"
+#include "core/study/windows/observer.hpp"
 
 namespace {
 

@@ -10,7 +10,7 @@
 #include "core/config/config.hpp"
 #include "core/sim/vehicle/quadrotor.hpp"
 #include "core/sim/vehicle/vio.hpp"
-#include "core/study/windows/observation.hpp"
+#include "core/study/windows/observer.hpp"
 
 namespace backwash::study {
 namespace {
