@@ -61,7 +61,7 @@ Evidence::Evidence(const Observations& seen)
     for (int k = 0; k < 2; ++k) {
       DesignColumn tilt{{{kMeanX, {}}, {kMeanY, {}}}};
       for (const auto& w : seen.windows)
-        for (int i = 0; i < 2; ++i) tilt.parts[static_cast<std::size_t>(i)].x.push_back(w.R_WB(i, k));
+        for (int i = 0; i < 2; ++i) tilt.parts[static_cast<std::size_t>(i)].x.push_back(w.body_axis(k)[i]);
       tilts_.push_back(std::move(tilt));
     }
   }

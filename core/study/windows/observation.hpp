@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <string>
@@ -85,22 +86,24 @@ struct WindowRow {
   Vec3 p_W, v_W;  ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
   double speed;   ///< m/s, mean of the norm
   std::array<double, kPoints> speeds{}, shares{};  ///< m/s, along the window; of the modelled variance, sum 1
-  Mat3 R_WB;          ///< mean rotation by the heading alone (not orthonormal); zero without attitude
-  double yaw;         ///< rad
-  double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
-  double voltage;     ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
+  std::optional<Mat3> R_WB;  ///< mean rotation by the heading alone (not orthonormal); nothing without attitude
+  double thrust_acc;         ///< T/m of the logged command, m/s²; g without thrust
+  double voltage;            ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
   double temperature;
   PlaceAround around;             ///< of p_W
   std::vector<PlaceAround> path;  ///< of points along the window; empty where it is one place
-  Vec3 give = Vec3::Zero();     ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
+  /// Of a window whose p_W and v_W are those of the loop that hears set-points alone.
+  struct Led {
+    Vec3 give = Vec3::Zero();    ///< how far a steady push moves the craft off p_W, 1/k_p, s²
+    Vec3 slowed = Vec3::Zero();  ///< m: what a drag of 1 1/s takes off v_W, by the loop's answer
+    /// Its acceleration, m/s²: the mean and, along the window, the variance, the trend taken out.
+    Vec3 asked_W = Vec3::Zero(), asked2 = Vec3::Zero();
+    Vec3 off_W = Vec3::Zero();  ///< measured place less p_W, m
+  };
+  std::optional<Led> led;       ///< nothing where p_W and v_W are measured
   bool held_off = false;        ///< an integrator holds a steady push off: it moves the craft for some seconds only
-  Vec3 slowed = Vec3::Zero();   ///< m: what a drag of 1 1/s takes off v_W, by the loop's answer; 0 where measured
   Vec3 varied2 = Vec3::Zero();  ///< (m/s)², variance of the velocity along the window, its trend taken out
-  /// Acceleration where the set-points alone lead, m/s²: its mean and, along the window, its variance, the trend taken
-  /// out. 0 where measured.
-  Vec3 asked_W = Vec3::Zero(), asked2 = Vec3::Zero();
-  Vec3 off_W = Vec3::Zero();  ///< measured place less p_W, m; 0 where p_W is measured
-  Vec3 sigma;                 ///< modelled variance per axis, (m/s²)²
+  Vec3 sigma;                   ///< modelled variance per axis, (m/s²)²
   /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±offset_limit.
   std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
   /// Design of kThrustDelay and kThrustSlope, of (delay, slope); 0 where nothing was excited.
@@ -117,6 +120,10 @@ struct WindowRow {
       lines{};  ///< of the rotors along z, none that cannot be told, the gusts' share taken out of floor2, (m/s²)²
   /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
   Vec3 ln_sigma_at(const Vec3& offset_W) const;
+  /// Axis of the body in W, by the heading; zero where the attitude is not known: what is fixed to the body is not
+  /// told.
+  Vec3 body_axis(int i) const { return R_WB ? Vec3(R_WB->col(i)) : Vec3(Vec3::Zero()); }
+  double yaw() const { return std::atan2(body_axis(0).y(), body_axis(0).x()); }  ///< rad
 };
 
 /// What is left out, flipped and scattered together: one flight, or the flights of one day. first[k]: the window at

@@ -118,15 +118,14 @@ struct Visitor {
     for (const auto& s : seen) stage.add(s.window, s.y, s.design);
   }
   void visit(Delays& d) { (*this)(d.thrust, d.command, d.tilt); }
+  void visit(WindowRow::Led& l) { (*this)(l.give, l.slowed, l.asked_W, l.asked2, l.off_W); }
   /// The names are counted by the compiler: a field that is new in WindowRow has to be named here, too.
   void visit(WindowRow& row) {
-    auto& [flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, yaw, thrust_acc, voltage, temperature,
-           around, path, give, held_off, slowed, varied2, asked_W, asked2, off_W, sigma, ln_sigma_moved, delay_gain,
-           slope_gain, mean_gain, delay_at, slope_at, climbs, command_gain, lag_gain, tilt_gain, measured_variance,
-           lines] = row;
-    (*this)(flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, yaw, thrust_acc, voltage);
-    (*this)(temperature, around, path, give, held_off, slowed, varied2, asked_W, asked2, off_W, sigma, ln_sigma_moved,
-            delay_gain);
+    auto& [flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, thrust_acc, voltage, temperature,
+           around, path, led, held_off, varied2, sigma, ln_sigma_moved, delay_gain, slope_gain, mean_gain, delay_at,
+           slope_at, climbs, command_gain, lag_gain, tilt_gain, measured_variance, lines] = row;
+    (*this)(flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, thrust_acc, voltage);
+    (*this)(temperature, around, path, led, held_off, varied2, sigma, ln_sigma_moved, delay_gain);
     (*this)(slope_gain, mean_gain, delay_at, slope_at, climbs, command_gain, lag_gain, tilt_gain, measured_variance);
     visit(lines);
   }

@@ -93,9 +93,7 @@ WindowRow placed(const log::FlightLog& log, const Series& s, SampleRange w, cons
   const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kWindowRules.stray;
   const auto &p = as_told ? s.p_nominal : s.p, &v = as_told ? s.v_nominal : s.v;
   row.p_W = mean_of(p), row.v_W = mean_of(v);
-  row.give = as_told ? Vec3(loop::PositionLoop(vehicle).kp.cwiseInverse()) : Vec3(Vec3::Zero());
   row.held_off = vehicle.controller.velocity_integrator.horizontal > 0;
-  if (as_told) row.slowed = (row.v_W - mean_of(s.v_dragged)) / kWindowRules.loop_drag;
   const auto varied2 = [&](const std::vector<Vec3>& x) {
     Vec3 square = Vec3::Zero();
     for (int axis = 0; axis < 3; ++axis)
@@ -104,16 +102,15 @@ WindowRow placed(const log::FlightLog& log, const Series& s, SampleRange w, cons
     return square;
   };
   row.varied2 = varied2(v);
-  if (as_told) {
-    row.asked_W = mean_of(s.a_nominal);
-    row.asked2 = varied2(s.a_nominal);
-  }
-  row.off_W = as_told ? Vec3(mean_of(s.p) - row.p_W) : Vec3(Vec3::Zero());
+  if (as_told)
+    row.led = {.give = loop::PositionLoop(vehicle).kp.cwiseInverse(),
+               .slowed = (row.v_W - mean_of(s.v_dragged)) / kWindowRules.loop_drag,
+               .asked_W = mean_of(s.a_nominal),
+               .asked2 = varied2(s.a_nominal),
+               .off_W = mean_of(s.p) - row.p_W};
   // The mean of the measured speed would hold every gust rectified: without set-points, the way made good.
   row.speed = as_told ? mean_over(w, 0.0, [&](std::size_t i) { return v[i].norm(); }) : row.v_W.norm();
-  row.R_WB = Mat3::Zero();
   if (!s.R_WB.empty()) row.R_WB = mean_over(w, Mat3(Mat3::Zero()), [&](std::size_t i) { return heading(s.R_WB[i]); });
-  row.yaw = std::atan2(row.R_WB(1, 0), row.R_WB(0, 0));
   row.thrust_acc = s.thrust_acc.empty() ? kGravity : mean_over(w, 0.0, [&](std::size_t i) { return s.thrust_acc[i]; });
   row.voltage = column_mean("battery_v");
   row.temperature = column_mean("temperature_c");
