@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/loop/position_loop.hpp"
 #include "core/types/time.hpp"
 
 namespace backwash::adapt {
@@ -21,7 +22,7 @@ bool modelled(const Vec3& sigma) noexcept { return sigma.allFinite() && sigma.mi
 
 ControlError::ControlError(const Vehicle& vehicle, const Gusts& gusts)
     : vehicle_(vehicle),
-      kp_(vehicle.controller.kp.horizontal, vehicle.controller.kp.horizontal, vehicle.controller.kp.vertical),
+      kp_(loop::PositionLoop(vehicle).kp),
       steps_(new Steps{ColouredStep(axis_loop(vehicle, false, Loop::vehicle), gusts.tau_high_s, kControlPeriod),
                        ColouredStep(axis_loop(vehicle, true, Loop::vehicle), gusts.tau_high_s, kControlPeriod)}),
       covariance_(unknown()),

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/loop/position_loop.hpp"
 #include "core/reach/bound/block_extents.hpp"
 #include "core/reach/clearance.hpp"
 #include "core/reach/ellipsoid.hpp"
@@ -40,8 +41,7 @@ Vec3 box(const PerDirection& half_widths) { return {half_widths[kX], half_widths
 /// Where a set hovering at p has its centre, from p: static answer of the loop to the mean push.
 Vec3 static_shift(const Vehicle& vehicle, const Vec3& push_W) {
   if (has_integrator(vehicle)) return Vec3::Zero();
-  const auto& kp = vehicle.controller.kp;
-  return push_W.cwiseQuotient(Vec3(kp.horizontal, kp.horizontal, kp.vertical));
+  return push_W.cwiseQuotient(loop::PositionLoop(vehicle).kp);
 }
 
 /// Clearance of a set, exact up to the cap. The distance field brackets the answer: the set holds p, so it is no

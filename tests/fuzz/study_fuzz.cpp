@@ -6,6 +6,7 @@
 
 #include "core/study/findings/study.hpp"
 #include "core/study/findings/study_page.hpp"
+#include "core/study/windows/observer.hpp"
 #include "tests/fuzz/mutator.hpp"
 
 namespace backwash::fuzz {

@@ -15,27 +15,28 @@ import sys
 
 # From the ground up: a folder sees only folders above its own line.
 STUDY = "core/study/"
-FLIGHT = ["core/types", "core/map", "core/field", "core/reach", "core/plan", "core/track"]
+FLIGHT = ["core/types", "core/loop", "core/map", "core/field", "core/reach", "core/plan", "core/track"]
 MAY = {
     "core/types": [],
+    "core/loop": ["core/types"],
     "core/files": [],
     "core/sync": ["core/types"],
     "core/config": ["core/types", "core/files"],
     "core/map": ["core/types", "core/files"],
-    "core/field": FLIGHT[:2],
-    "core/reach": FLIGHT[:3],
-    "core/adapt": FLIGHT[:4],
-    "core/plan": FLIGHT[:4],
-    "core/track": FLIGHT[:5],
+    "core/field": ["core/types", "core/map"],
+    "core/reach": FLIGHT[:4],
+    "core/adapt": FLIGHT[:5],
+    "core/plan": FLIGHT[:5],
+    "core/track": FLIGHT[:6],
     "core/log": ["core/files", "core/adapt", *FLIGHT],
     "core/sim": ["core/log", *FLIGHT],
     "core/report": ["core/files", "core/log", "core/sim", *FLIGHT],
-    STUDY + "windows": ["core/types", "core/map", "core/field", "core/log"],
+    STUDY + "windows": ["core/types", "core/loop", "core/map", "core/field", "core/log"],
     STUDY + "calibrate": ["core/types", "core/config", "core/map", "core/field", "core/log", "core/report", STUDY + "windows"],
     STUDY + "effects": ["core/types", "core/map", "core/field", STUDY + "windows"],
-    STUDY + "loop": ["core/types", "core/log", STUDY + "windows"],
+    STUDY + "loop": ["core/types", "core/loop", "core/log", STUDY + "windows"],
     STUDY + "inference": ["core/types", STUDY + "windows", STUDY + "effects"],
-    STUDY + "findings": ["core/types", "core/config", "core/map", "core/field", "core/plan", "core/report",
+    STUDY + "findings": ["core/types", "core/loop", "core/config", "core/map", "core/field", "core/plan", "core/report",
                          STUDY + "windows", STUDY + "calibrate", STUDY + "effects", STUDY + "inference"],
     STUDY + "design": ["core/types", "core/map", "core/plan", "core/log", STUDY + "windows", STUDY + "effects",
                        STUDY + "inference", STUDY + "findings"],
@@ -49,7 +50,7 @@ MAY = {
     # What flies sees neither the simulation nor what judges flights afterwards.
     "services/backwashd": ["core/sync", "core/config", "core/adapt", "core/log", *FLIGHT, "firmware_bridge", "services/security",
                            "services/dds", "services/parallel", "services/command_line"],
-    "services/backwashctl": ["core/files", "core/config", *FLIGHT[:5], "services/security", "services/dds", "services/command_line"],
+    "services/backwashctl": ["core/files", "core/config", *FLIGHT[:6], "services/security", "services/dds", "services/command_line"],
     "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/security", "services/dds",
                        "services/parallel", "services/command_line"],
     "services/backwash": ["core", "firmware_bridge/autopilots", "services/security", "services/maps", "services/parallel", "services/command_line"],

@@ -206,7 +206,6 @@ Observations pushed_in_every_other(std::size_t flights, std::size_t from) {
     auto& w = seen.windows[i];
     w.flight = i / kOfFlight;
     w.sigma.setConstant(0.04);
-    w.R_WB.setZero();
     w.p_W = backwash::Vec3(draw(rng), 0, 1);
     if (i % kOfFlight == 0) seen.first.push_back(i);
     seen.y[kMeanZ][i] = draw(rng) + (w.flight % 2 == from ? w.p_W.x() : 0);

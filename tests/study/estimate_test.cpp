@@ -29,8 +29,6 @@ Observations flights() {
     auto& w = seen.windows[i];
     w.flight = i / kOfFlight;
     w.sigma.setConstant(0.04);
-    w.R_WB.setZero();
-    w.give.setZero();
     if (i % kOfFlight == 0) seen.first.push_back(i);
   }
   seen.first.push_back(seen.windows.size());
@@ -108,7 +106,7 @@ Observations over_a_floor(double size, double kp, unsigned seed) {
     const double height = told(rng);
     const auto [at, push] = at_rest(height, kp, [size](double h) { return size * 0.16 / (h * h); });
     seen.windows[i].around.height = height;
-    seen.windows[i].give = Vec3::Constant(1 / kp);
+    seen.windows[i].led.emplace().give = Vec3::Constant(1 / kp);
     measure(seen, kMeanZ, i, push + noise(rng));
   }
   return seen;
@@ -124,7 +122,7 @@ TEST(Refine, FindsAPushWhereTheCraftWasPushedToAndNotWhereItWasTold) {
       const Estimate e = refined(seen, "ground_thrust", {0.3}).parameters[0];
       aware += e.value / kWorlds;
       covered += covers(e, size);
-      for (auto& w : seen.windows) w.give.setZero();
+      for (auto& w : seen.windows) w.led.reset();
       unaware += refined(seen, "ground_thrust", {0.3}).parameters[0].value / kWorlds;
     }
     EXPECT_NEAR(aware, size, 0.04 * std::abs(size));
@@ -196,7 +194,7 @@ TEST(Refine, OfALoadLeavesTheVarianceOfTheAirAlone) {
     auto& w = seen.windows[i];
     const double a = i % 3 ? 0.0 : 1.5;
     w.thrust_acc = backwash::kGravity / 0.75;
-    w.asked2.setConstant(a * a / 2);
+    w.led.emplace().asked2.setConstant(a * a / 2);
     measure(seen, kMeanZ, i, -0.25 * w.thrust_acc + noise(rng));
     for (const Channel c : kVariances)
       measure(seen, c, i, std::log((w.sigma[0] + std::pow(a / 3, 2) / 2) / w.sigma[0]) + noise(rng));

@@ -12,6 +12,7 @@
 
 #include "core/log/columns/import_crazypad.hpp"
 #include "core/study/inference/rotors/rotor_reference.hpp"
+#include "core/study/windows/observer.hpp"
 
 namespace {
 

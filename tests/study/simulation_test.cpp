@@ -154,7 +154,8 @@ TEST(HoverShift, IsAsPredictedWithoutAnIntegratorAndRefutedWithOne) {
   ASSERT_EQ(believed.size(), 1u);
   EXPECT_GT(std::abs(believed[0].value.z()), 0.05);
 
-  for (auto& w : seen.windows) w.off_W *= 0.1;  // what an integrator leaves of it
+  for (auto& w : seen.windows)
+    if (w.led) w.led->off_W *= 0.1;  // what an integrator leaves of it
   NamedCause held = *cause;
   held.shift = check_shift(cause->found, cause->applied.beside, seen);
   EXPECT_TRUE(held.shift.refuted());

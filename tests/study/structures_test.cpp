@@ -84,7 +84,7 @@ TEST(Structures, AProductOfTwoPlacesIsToldWithBoth) {
 TEST(Structures, HarmonicsAreAddedUntilTheGainEnds) {
   auto seen = quiet();
   for (std::size_t i = 0; i < seen.windows.size(); ++i)
-    seen.y[kMeanZ][i] += 0.3 * std::cos(3 * seen.windows[i].yaw) + 0.25 * std::cos(5 * seen.windows[i].yaw);
+    seen.y[kMeanZ][i] += 0.3 * std::cos(3 * seen.windows[i].yaw()) + 0.25 * std::cos(5 * seen.windows[i].yaw());
   const auto result = studied(seen);
   ASSERT_EQ(result.verdict, StudyVerdict::unknown_structure) << study_worlds::told(result);
   EXPECT_EQ(result.unknown.front().shape, "turn 3 and 1 more");

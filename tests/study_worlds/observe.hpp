@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "core/study/findings/study.hpp"
+#include "core/study/windows/observer.hpp"
 #include "tests/study_worlds/world.hpp"
 
 namespace study_worlds {

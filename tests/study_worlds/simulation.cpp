@@ -13,6 +13,7 @@
 #include "core/sim/setpoint_flight.hpp"
 #include "core/study/findings/extend.hpp"
 #include "core/study/findings/residuals.hpp"
+#include "core/study/windows/observer.hpp"
 #include "tests/study_worlds/observe.hpp"
 #include "tests/support/terms_of.hpp"
 

@@ -12,7 +12,7 @@ import sys
 import tempfile
 
 LAYERING, MODEL, GLOSSARY = "tests/layering/includes.py", "tests/docs/model.py", "tests/docs/glossary.py"
-CITATIONS, TYPES = "tests/docs/citations.py", "tests/style/types_once.py"
+CITATIONS, TYPES, ONE_CLASS = "tests/docs/citations.py", "tests/style/types_once.py", "tests/style/one_class.py"
 TRACK = "core/track/orders.cpp"  # of a folder that may include neither core/log nor the daemon
 LOG = '"core/log/raw/raw_log.hpp"'
 # checker, file, what is put at its end (or in place of what stands before the arrow), what is said; "" where it shall pass
@@ -47,6 +47,9 @@ PLANTED = [
     (TYPES, TRACK, "namespace backwash::track {\nenum class Request : char { none };\n}\n", "backwash::track::Request is defined in"),
     (TYPES, TRACK, "namespace backwash::track {\nnamespace {\nclass Tracker {};\n}\n}\n", ""),
     (TYPES, TRACK, "namespace backwash::track {\nclass Tracker;\nvoid f() { struct Tracker {}; }\n}\n", ""),
+    (ONE_CLASS, TRACK, "namespace backwash::track {\nvoid Tracker::again() {}\n}\n", "backwash::track::Tracker is defined in"),
+    (ONE_CLASS, TRACK, "namespace backwash::track {\nTracker::Tracker(int a)\n    : a_(a) {}\n}\n", "backwash::track::Tracker is defined in"),
+    (ONE_CLASS, TRACK, "namespace backwash::track {\nvoid again(Tracker& t) { t.Tracker::step(); }\n}\n", ""),
     (GLOSSARY, "README.md", "The GPHX is told by PHXQ. ", ""),
     (GLOSSARY, "README.md + core/README.md", "The PHXQ is told. ", "'PHXQ' is used by 2 documents"),
 ]
@@ -72,7 +75,7 @@ def main() -> int:
             done = subprocess.run([sys.executable, copy / checker, copy], capture_output=True, text=True)
             return done.returncode, done.stdout + done.stderr
 
-        for checker in (LAYERING, MODEL, CITATIONS, TYPES, GLOSSARY):
+        for checker in (LAYERING, MODEL, CITATIONS, TYPES, ONE_CLASS, GLOSSARY):
             if told(checker)[0]:
                 wrong += 1
                 print(f"{checker} fails on the copy itself: {told(checker)[1]}")

@@ -6,23 +6,21 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "core/loop/position_loop.hpp"
 #include "core/reach/response/response_builder.hpp"
 
 namespace backwash::reach {
 
 AxisLoop axis_loop(const Vehicle& vehicle, bool vertical, Loop loop) {
-  const auto& c = vehicle.controller;
-  AxisLoop axis{vertical ? c.kp.vertical : c.kp.horizontal, vertical ? c.kd.vertical : c.kd.horizontal,
-                c.feedback_delay, c.attitude_lag,
-                vertical ? c.velocity_integrator.vertical : c.velocity_integrator.horizontal};
+  const loop::PositionLoop of(vehicle);
+  const int k = vertical ? 2 : 0;
+  AxisLoop axis{of.kp[k], of.kd[k], of.feedback_delay, of.attitude_lag, of.ki[k]};
   if (loop == Loop::continuous) axis.feedback_delay = axis.attitude_lag = 0;
   return axis;
 }
 
 Vec3 commanded_acceleration(const Vehicle& vehicle, const State& state, const Setpoint& command) noexcept {
-  const auto& c = vehicle.controller;
-  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
-  return command.a_W + kp.cwiseProduct(command.p_W - state.p_W) + kd.cwiseProduct(command.v_W - state.v_W);
+  return loop::PositionLoop(vehicle).asked(command, state);
 }
 
 void refuse(const AxisLoop& axis, const char* why) {

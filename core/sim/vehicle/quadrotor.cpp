@@ -18,25 +18,22 @@ long steps_in(double seconds) { return std::lround(seconds / Quadrotor::kStep); 
 
 Quadrotor::Quadrotor(const Vehicle& vehicle, const State& start, std::optional<double> z_floor)
     : vehicle_(vehicle),
+      loop_(vehicle),
       state_(start),
       z_floor_(z_floor),
-      feedback_(static_cast<std::size_t>(steps_in(vehicle.controller.feedback_delay)), start) {
+      feedback_(static_cast<std::size_t>(steps_in(loop_.feedback_delay)), start) {
   active_.p_W = start.p_W;
   on_ground_ = z_floor && start.p_W.z() <= *z_floor;
 }
 
 void Quadrotor::command(const Setpoint& setpoint) {
-  in_transit_.emplace_back(steps_ + steps_in(vehicle_.controller.latency), setpoint);
+  in_transit_.emplace_back(steps_ + steps_in(loop_.latency), setpoint);
 }
 
 Vec3 Quadrotor::specific_force(const State& believed) noexcept {
   if (!motors_on_ || on_ground_) integrated_.setZero();
   if (!motors_on_) return Vec3::Zero();
-  const auto& c = vehicle_.controller;
-  const Vec3 kp{c.kp.horizontal, c.kp.horizontal, c.kp.vertical};
-  const Vec3 kd{c.kd.horizontal, c.kd.horizontal, c.kd.vertical};
-  const Vec3 u =
-      active_.a_W + kp.cwiseProduct(active_.p_W - believed.p_W) + kd.cwiseProduct(active_.v_W - believed.v_W);
+  const Vec3 u = loop_.asked(active_, believed);
   // Height goes before sideways motion: limit the vertical part, then what is left of thrust and tilt.
   const double max = vehicle_.propulsion.max_thrust / vehicle_.body.mass, min = kMinThrust * max;
   Vec3 f = u + integrated_ + kGravityUp;
@@ -45,11 +42,9 @@ Vec3 Quadrotor::specific_force(const State& believed) noexcept {
   const double horizontal = f.head<2>().norm();
   const double allowed = std::min(std::tan(kMaxTilt) * f.z(), std::sqrt(max * max - f.z() * f.z()));
   if (horizontal > allowed) f.head<2>() *= allowed / horizontal;
-  const auto& integrator = c.velocity_integrator;
-  const Vec3 ki{integrator.horizontal, integrator.horizontal, integrator.vertical};
   // Held at the limits, as autopilots do: what cannot be given is not asked for ever more.
-  if (ki != Vec3::Zero() && !on_ground_ && f == asked)
-    integrated_ += kStep * ki.cwiseQuotient(kd).cwiseProduct(u - active_.a_W);
+  if (loop_.ki != Vec3::Zero() && !on_ground_ && f == asked)
+    integrated_ += kStep * loop_.ki.cwiseQuotient(loop_.kd).cwiseProduct(u - active_.a_W);
   return f;
 }
 
@@ -73,9 +68,8 @@ void Quadrotor::step(const Vec3& w_W, const State& estimated) {
   if (!feedback_.empty()) std::swap(believed, feedback_[static_cast<std::size_t>(steps_) % feedback_.size()]);
   const Vec3 wanted = specific_force(believed) - kGravityUp;
 
-  const double lag = vehicle_.controller.attitude_lag;
-  const Vec3 before = lag > 0 ? produced_ : wanted;
-  produced_ = lag > 0 ? Vec3(wanted + std::exp(-kStep / lag) * (produced_ - wanted)) : wanted;
+  const Vec3 before = loop_.attitude_lag > 0 ? produced_ : wanted;
+  produced_ = loop_.after(produced_, wanted, kStep);
   const State start = state_;
   acceleration_ = given(0.5 * (before + produced_)) + w_W;
   state_.v_W += kStep * acceleration_;

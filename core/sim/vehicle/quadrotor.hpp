@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/loop/position_loop.hpp"
 #include "core/sim/vehicle/thrust_terms.hpp"
 #include "core/types/state.hpp"
 #include "core/types/vehicle.hpp"
@@ -60,6 +61,7 @@ class Quadrotor {
   Vec3 given(const Vec3& produced);
 
   Vehicle vehicle_;
+  loop::PositionLoop loop_;
   State state_;
   std::optional<double> z_floor_;
   bool motors_on_ = true, on_ground_ = false;

@@ -7,6 +7,7 @@
 
 #include "core/study/design/design_rules.hpp"
 #include "core/study/effects/on_the_model.hpp"
+#include "core/study/windows/observer.hpp"
 #include "core/types/quantile.hpp"
 #include "core/types/thrust.hpp"
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/study/windows/observation.hpp"
+#include "core/types/vehicle.hpp"
 #include "core/types/state.hpp"
 
 namespace backwash::study {

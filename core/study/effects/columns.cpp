@@ -12,8 +12,8 @@ double power_of_distance(double distance, double reference, double n) {
 std::vector<DesignColumn> body_drift(const Windows& ws, const std::function<double(const WindowRow&)>& amount) {
   std::vector<DesignColumn> columns;
   for (int i = 0; i < 3; ++i) {
-    DesignColumn c = level(ws, [&](auto& w) -> Vec3 { return amount(w) * w.R_WB.col(i); });
-    c.parts.push_back({kMeanZ, values(ws, [&](auto& w) { return amount(w) * w.R_WB(2, i); })});
+    DesignColumn c = level(ws, [&](auto& w) -> Vec3 { return amount(w) * w.body_axis(i); });
+    c.parts.push_back({kMeanZ, values(ws, [&](auto& w) { return amount(w) * w.body_axis(i).z(); })});
     columns.push_back(std::move(c));
   }
   return columns;
@@ -44,11 +44,14 @@ DesignColumn missing_thrust(const Windows& ws, double m) {
   for (Eigen::Index axis = 0; axis < 3 && m != 0; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     if (axis < 2)
-      column.parts.push_back(
-          {static_cast<Channel>(kMeanX + a), values(ws, [&](auto& w) { return -more * w.asked_W[axis]; }), true});
+      column.parts.push_back({static_cast<Channel>(kMeanX + a),
+                              values(ws, [&](auto& w) { return w.led ? -more * w.led->asked_W[axis] : 0; }), true});
     column.parts.push_back(
         {kVariances[a],
-         values(ws, [&](auto& w) { return std::log1p(std::pow(m * more, 2) * w.asked2[axis] / w.sigma[axis]) / m; }),
+         values(ws,
+                [&](auto& w) {
+                  return w.led ? std::log1p(std::pow(m * more, 2) * w.led->asked2[axis] / w.sigma[axis]) / m : 0;
+                }),
          true});
   }
   return column;

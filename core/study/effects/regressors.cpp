@@ -33,7 +33,7 @@ std::vector<Regressor> regressors(const Observations& seen) {
   if (seen.has(Source::battery)) all.push_back({"battery_v", false, [](const WindowRow& w) { return w.voltage; }});
   if (seen.has(Source::temperature))
     all.push_back({"temperature_c", false, [](const WindowRow& w) { return w.temperature; }});
-  if (seen.has(Source::attitude)) all.push_back({"yaw_rad", true, [](const WindowRow& w) { return w.yaw; }});
+  if (seen.has(Source::attitude)) all.push_back({"yaw_rad", true, [](const WindowRow& w) { return w.yaw(); }});
   return all;
 }
 
@@ -67,8 +67,8 @@ Windows moved_by(const Windows& windows, const std::vector<DesignColumn>& column
       for (const auto& part : columns[k].parts)
         if (part.channel <= kMeanZ)
           push[static_cast<Eigen::Index>(part.channel)] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
-    if (moved[i].held_off) continue;
-    const Vec3 by = push.cwiseProduct(moved[i].give).cwiseMax(-kStrayed).cwiseMin(kStrayed);
+    if (moved[i].held_off || !moved[i].led) continue;
+    const Vec3 by = push.cwiseProduct(moved[i].led->give).cwiseMax(-kStrayed).cwiseMin(kStrayed);
     const auto move = [&](PlaceAround& place) {
       place.height += by.z();
       place.ceiling_gap -= by.z();
@@ -98,7 +98,7 @@ std::vector<DesignColumn> offsets(const std::vector<DesignColumn>& columns, cons
     free.push_back(level(ws, [](auto&) -> Vec3 { return Vec3::UnitX(); }));
     free.push_back(level(ws, [](auto&) -> Vec3 { return Vec3::UnitY(); }));
     if (seen.has(Source::attitude))
-      for (int i = 0; i < 2; ++i) free.push_back(level(ws, [i](auto& w) -> Vec3 { return w.R_WB.col(i); }));
+      for (int i = 0; i < 2; ++i) free.push_back(level(ws, [i](auto& w) -> Vec3 { return w.body_axis(i); }));
   }
   if (used[kMeanZ]) free.push_back(in(kMeanZ, ws, [](auto&) { return 1.0; }));
   if (used[kVarX] || used[kVarY] || used[kVarZ]) {

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <vector>
 
+#include "core/loop/position_loop.hpp"
 #include "core/plan/planner.hpp"
 #include "core/study/findings/extend.hpp"
 #include "core/study/inference/coverage.hpp"
@@ -126,8 +127,7 @@ std::vector<reach::HoverSet> sets_in_the_open(const Model& model, const Vehicle&
       set.half_widths[d] = (d == kZ ? reach.vertical : reach.horizontal).h_inf * net.w[d];
     return {set};
   }
-  const auto& kp = vehicle.controller.kp;
-  set.shift = air.push_W.cwiseQuotient(Vec3(kp.horizontal, kp.horizontal, kp.vertical));
+  set.shift = air.push_W.cwiseQuotient(loop::PositionLoop(vehicle).kp);
   return {set};
 }
 

@@ -42,12 +42,12 @@ ShiftCheck check_shift(const Accepted& cause, const std::vector<double>& beside,
   Sums all;
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     const auto& w = seen.windows[i];
-    if (w.give.isZero() || w.held_off || w.speed > kRules.hovering) continue;
-    const Vec3 shift = push[i].cwiseProduct(w.give);
+    if (!w.led || w.held_off || w.speed > kRules.hovering) continue;
+    const Vec3 shift = push[i].cwiseProduct(w.led->give);
     for (Sums* s : {&flights[w.flight], &all}) {
-      s->product += shift.dot(w.off_W);
+      s->product += shift.dot(w.led->off_W);
       s->predicted += shift.squaredNorm();
-      s->measured += w.off_W.squaredNorm();
+      s->measured += w.led->off_W.squaredNorm();
       s->n += 1;
     }
   }

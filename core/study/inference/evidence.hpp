@@ -3,45 +3,13 @@
 
 #include <Eigen/Dense>
 #include <array>
-#include <optional>
 #include <vector>
 
 #include "core/study/effects/regressors.hpp"
-#include "core/study/inference/rules.hpp"
+#include "core/study/inference/levels/anova.hpp"
+#include "core/study/inference/normal_equations.hpp"
 
 namespace backwash::study {
-
-inline constexpr int kMostColumns = static_cast<int>(kRules.most_columns);
-using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns>;
-using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostColumns, 1>;
-
-/// Normal equations of some columns per flight, with nuisance columns projected out of them and of the data:
-/// A_f = X̃ᵀV⁻¹X̃, b_f = X̃ᵀV⁻¹ỹ over the windows of flight f.
-struct NormalEquations {
-  std::vector<SmallMatrix> A;
-  std::vector<SmallVector> b;
-  std::vector<SmallMatrix> left_out;  ///< (ΣA − A_f)⁻¹
-  SmallMatrix total;                  ///< ΣA
-  bool excited = false;               ///< no column is one that the nuisance explains
-  bool solvable = false;              ///< excited, and every flight may be left out
-
-  /// θ = (ΣA)⁻¹ Σ s_f b_f.
-  SmallVector fit(const std::vector<int>& signs = {}) const;
-  /// θ₋f.
-  SmallVector fit_without(std::size_t flight) const;
-  /// Held-out gain in nats: Σ_f θ₋fᵀ s_f b_f − ½ θ₋fᵀ A_f θ₋f, flights' residuals multiplied by signs ±1.
-  double gain(const std::vector<int>& signs = {}) const;
-  std::vector<double> gain_per_flight() const;
-};
-
-/// Variances of a channel, of windows within a flight, of flights, and of units of several flights (none of their own
-/// where a unit is a flight).
-struct Scatter {
-  double within, between, units;
-};
-
-/// Scatter between the rotors and sensors of a craft that is no effect and that no number of flights averages out.
-double built_scatter(Channel c);
 
 /// A column seen in axes of which the scatter is independent: ln variance along x, y and z wanders as one (gusts are
 /// strong or weak along all axes), so its three channels become √3 times their mean, (x − y)/√2 and (x + y − 2z)/√6.
@@ -79,14 +47,13 @@ class Evidence {
   double weight(Channel c, std::size_t window) const { return weight_[c][window]; }
   /// Whether a window measures a channel (decorrelated).
   bool measured(Channel c, std::size_t window) const { return weight_[c][window] > 0; }
-  Scatter scatter(Channel c) const { return {within_[c], between_[c], unit_[c]}; }
+  Scatter scatter(Channel c) const { return scatter_[c]; }
 
  private:
   /// XᵀV⁻¹X of each flight, X the columns and last y.
   std::vector<Eigen::MatrixXd> grams(const std::vector<const DesignColumn*>& columns) const;
   void take_flights_out(DesignColumn& residual) const;
   void add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<DesignColumn>& columns) const;
-  void anova(Channel c, const std::vector<double>& residual);
   void weigh_means(const std::vector<double>& ln_variance);
   double trim_scatter(const DesignColumn& residual) const;
 
@@ -95,7 +62,7 @@ class Evidence {
   std::array<std::vector<double>, kChannels> weight_;
   std::vector<DesignColumn> tilts_;      // Z; empty without attitude
   std::vector<std::size_t> flight_end_;  // per window, where its flight ends
-  std::array<double, kChannels> within_{}, between_{}, unit_{};
+  std::array<Scatter, kChannels> scatter_{};
   double tilt_ = 0;  // σ_t²
 };
 

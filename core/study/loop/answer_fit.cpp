@@ -43,15 +43,17 @@ Vehicle with(Vehicle vehicle, const VectorXd& theta, bool level, double late) {
   return vehicle;
 }
 
-/// A set-point acts a quarter of a period late on the mean of logs that are held and ones that are streamed, as
-/// loop_of() has it.
-std::vector<Vec3> answer_of(const AnswerLog& log, Vehicle vehicle, double forward) {
+std::vector<Vec3> answer_of(const AnswerLog& log, const Vehicle& vehicle, double forward) {
   const Series& s = log.series;
-  Commands commands = log.commands;
-  for (auto& a : commands.a) a *= forward;
-  vehicle.controller.latency += kWindowRules.command_age * s.t.back() / static_cast<double>(s.size() - 1);
-  const std::array<double, 1> lag{vehicle.controller.attitude_lag};
-  return answers(s, commands, vehicle, lag).front();
+  auto commands = log.commands;
+  for (auto& c : commands) c.a_W *= forward;
+  const auto loop = with_command_age(loop::PositionLoop(vehicle), s.t);
+  return answers({s.t, s.p, s.v, commands}, loop, std::array{loop.attitude_lag}).front();
+}
+
+std::vector<Vec3> positions_of(const AnswerLog& log, const Vehicle& vehicle) {
+  const Series& s = log.series;
+  return loop_of({s.t, s.p, s.v, log.commands}, with_command_age(loop::PositionLoop(vehicle), s.t), true).p;
 }
 
 /// slow(…, detrended(x), width) of a window as a matrix: it is asked for thousands of times.
@@ -209,7 +211,7 @@ Answers fit_level(std::span<const AnswerLog> logs, const Vehicle& start, bool by
     };
   } else {
     of.modelled = [&start, late](const AnswerLog& log, const VectorXd& t) {
-      return loop_of(log.series, log.commands, with(start, t, true, late), true).p;
+      return positions_of(log, with(start, t, true, late));
     };
     of.measured = [](const Series& s, std::size_t i) { return s.p[i]; };
   }
@@ -235,7 +237,7 @@ Answers fit_vertical(std::span<const AnswerLog> logs, const Vehicle& start, bool
     of.measured = [](const Series& s, std::size_t i) { return s.a_sim[i]; };
   } else {
     of.modelled = [&start, late](const AnswerLog& log, const VectorXd& t) {
-      return loop_of(log.series, log.commands, with(start, t, false, late), true).p;
+      return positions_of(log, with(start, t, false, late));
     };
     of.measured = [](const Series& s, std::size_t i) { return s.p[i]; };
   }

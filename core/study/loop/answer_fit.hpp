@@ -13,7 +13,7 @@ namespace backwash::study {
 /// A log as the fit reads it: its samples, set-points, and windows that are good.
 struct AnswerLog {
   Series series;
-  Commands commands;
+  std::vector<Setpoint> commands;
   std::vector<SampleRange> windows;
 };
 

@@ -37,7 +37,7 @@ void add_windows(const Even& e, SampleRange stretch, std::size_t length, FlightW
     filtered[i] = band_passed(signal[i], e.rate, flight.band);
   }
   flight.gusts.push_back(gust_fits(signal, e.rate, flight.band, [&flight](std::size_t axis, double f_hz) {
-    return flight.loops.empty() ? 1 : flight.loops[axis].passes(f_hz);
+    return flight.loop ? flight.loop->passes(static_cast<int>(axis), f_hz) : 1;
   }));
   for (std::size_t begin = stretch.begin; begin < stretch.end; begin += length) {
     const SampleRange s{begin, begin + length};
@@ -118,12 +118,9 @@ void choose_signal(FlightWindows& flight, bool commanded, const std::optional<Ve
   flight.attenuation = Vec3::Ones();
   flight.signal = !vehicle ? Signal::raw : commanded ? Signal::commanded : Signal::divided;
   if (flight.signal != Signal::divided) return;
-  const auto& c = vehicle->controller;
-  const PositionLoop horizontal{c.kp.horizontal, c.kd.horizontal, c.feedback_delay, c.attitude_lag},
-      vertical{c.kp.vertical, c.kd.vertical, c.feedback_delay, c.attitude_lag};
-  flight.loops = {horizontal, horizontal, vertical};
-  for (std::size_t axis = 0; axis < flight.loops.size(); ++axis)
-    flight.attenuation[static_cast<Eigen::Index>(axis)] = loop_attenuation(flight.loops[axis], tau_w, flight.band);
+  flight.loop = loop::PositionLoop(*vehicle);
+  for (int axis = 0; axis < 3; ++axis)
+    flight.attenuation[axis] = loop_attenuation(*flight.loop, axis, tau_w, flight.band);
 }
 
 /// Windows that gaps between stretches swallowed; mean rate within them, Hz.

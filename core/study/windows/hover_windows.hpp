@@ -39,10 +39,10 @@ struct Window {
 /// A flight, cut into windows.
 struct FlightWindows {
   Signal signal = Signal::raw;
-  Band band;                        ///< that the log's rate allows
-  double rate_hz{};                 ///< mean rate of the rows
-  std::vector<PositionLoop> loops;  ///< per axis, those that were divided out; none for Signal::commanded and raw
-  Vec3 attenuation;                 ///< var(a)/var(w) of each; 1 without
+  Band band;                                     ///< that the log's rate allows
+  double rate_hz{};                              ///< mean rate of the rows
+  std::optional<loop::PositionLoop> loop;        ///< that was divided out; none for Signal::commanded and raw
+  Vec3 attenuation;                              ///< its var(a)/var(w) per axis; 1 without
   std::array<std::size_t, kHoverGates> gated{};  ///< windows left out, by Gate
   std::vector<std::string> not_tested;           ///< gates without the columns they need, and which those are
   std::vector<Window> windows;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/loop/position_loop.hpp"
+
 namespace backwash::study {
 namespace {
 
@@ -63,24 +65,22 @@ std::vector<Vec3> differentiated(const std::vector<Vec3>& x, double rate) {
   return rates;
 }
 
-/// a minus what the rotors produce on the commands, by the vehicle's gains, delays and lag.
+/// a minus what the rotors produce on the commands, by the vehicle's loop.
 std::vector<Vec3> beyond_command(const Even& e, const Resampler& rows, const log::FlightLog& log,
                                  const Vehicle& vehicle) {
-  const auto& c = vehicle.controller;
-  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
+  const loop::PositionLoop loop(vehicle);
   const auto cmd_p = rows.xyz("cmd_", "_m");
   const auto cmd_v = has_xyz(log, "cmd_v", "_mps") ? rows.xyz("cmd_v", "_mps") : differentiated(cmd_p, e.rate);
   const auto cmd_a =
       has_xyz(log, "cmd_a", "_mps2") ? rows.xyz("cmd_a", "_mps2") : std::vector<Vec3>(e.size(), Vec3::Zero());
-  const double follows = c.attitude_lag > 0 ? 1 - std::exp(-1 / (c.attitude_lag * e.rate)) : 1;
   std::vector<Vec3> w;
   Vec3 rotors = Vec3::Zero(), last = Vec3::Zero();
   for (std::size_t k = 0; k < e.size(); ++k) {
-    const Vec3 u = before(cmd_a, k, c.latency, e.rate) +
-                   kp.cwiseProduct(before(cmd_p, k, c.latency, e.rate) - before(e.p, k, c.feedback_delay, e.rate)) +
-                   kd.cwiseProduct(before(cmd_v, k, c.latency, e.rate) - before(e.v, k, c.feedback_delay, e.rate));
-    const Vec3 driven = c.attitude_lag > 0 ? Vec3(0.5 * (last + u)) : u;
-    rotors = k == 0 ? u : Vec3(rotors + follows * (driven - rotors));
+    const auto sent = [&](const std::vector<Vec3>& x) { return before(x, k, loop.latency, e.rate); };
+    const auto felt = [&](const std::vector<Vec3>& x) { return before(x, k, loop.feedback_delay, e.rate); };
+    const Vec3 u = loop.asked({sent(cmd_p), sent(cmd_v), sent(cmd_a)}, {felt(e.p), felt(e.v)});
+    const Vec3 driven = loop.attitude_lag > 0 ? Vec3(0.5 * (last + u)) : u;
+    rotors = k == 0 ? u : loop.after(rotors, driven, 1 / e.rate);
     last = u;
     w.push_back(e.a[k] - rotors);
   }

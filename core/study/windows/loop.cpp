@@ -19,73 +19,98 @@ std::vector<Vec3> vectors(const log::FlightLog& log, const std::vector<std::size
   return out;
 }
 
-Commands commands_of(const log::FlightLog& log, const std::vector<std::size_t>& rows) {
+std::vector<Setpoint> commands_of(const log::FlightLog& log, const std::vector<std::size_t>& rows) {
   const auto or_rest = [&](const char* prefix, const char* unit) {
     return has_xyz(log, prefix, unit) ? vectors(log, rows, prefix, unit) : std::vector<Vec3>(rows.size(), Vec3::Zero());
   };
-  return {vectors(log, rows, "cmd_", "_m"), or_rest("cmd_v", "_mps"), or_rest("cmd_a", "_mps2")};
+  const auto p = vectors(log, rows, "cmd_", "_m"), v = or_rest("cmd_v", "_mps"), a = or_rest("cmd_a", "_mps2");
+  std::vector<Setpoint> commands;
+  for (std::size_t k = 0; k < rows.size(); ++k) commands.push_back({p[k], v[k], a[k]});
+  return commands;
 }
 
-LoopMotion loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool closed, double drag) {
-  const auto& c = vehicle.controller;
-  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
+namespace {
+
+/// A time within the rows of a log, near the one before. Rows are joined by lines, but set-points of rows farther apart
+/// than `held` are held.
+class Place {
+ public:
+  explicit Place(const Flown& log, double held = kWindowRules.held) : log_(log), held_(held) {}
+  Place& at(double t) {
+    const auto& rows = log_.t;
+    while (row_ > 0 && rows[row_] > t + kWindowRules.stamp_error) --row_;
+    while (row_ + 2 < rows.size() && rows[row_ + 1] <= t + kWindowRules.stamp_error) ++row_;
+    share_ = std::clamp((t - rows[row_]) / (rows[row_ + 1] - rows[row_]), 0.0, 1.0);
+    return *this;
+  }
+  State state() const { return {between(log_.p[row_], log_.p[row_ + 1]), between(log_.v[row_], log_.v[row_ + 1])}; }
+  Setpoint command() const {
+    const Setpoint &a = log_.commands[row_], &b = log_.commands[row_ + 1];
+    if (share_ < 1 && log_.t[row_ + 1] - log_.t[row_] > held_) return a;
+    return {between(a.p_W, b.p_W), between(a.v_W, b.v_W), between(a.a_W, b.a_W)};
+  }
+
+ private:
+  Vec3 between(const Vec3& a, const Vec3& b) const { return a + share_ * (b - a); }
+
+  const Flown& log_;
+  const double held_;
+  std::size_t row_ = 0;
+  double share_ = 0;
+};
+
+/// Pieces of the time between two rows; one after a gap.
+int pieces(double dt) {
+  if (dt > kWindowRules.restart) return 1;
+  return std::max(1, static_cast<int>(std::ceil(dt / kWindowRules.loop_step)));
+}
+
+}  // namespace
+
+loop::PositionLoop with_command_age(loop::PositionLoop loop, std::span<const double> t) {
+  loop.latency += kWindowRules.command_age * ((t.back() - t.front()) / static_cast<double>(t.size() - 1));
+  return loop;
+}
+
+LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, bool closed, double drag) {
   LoopMotion out;
-  Vec3 p = cmd.p.front(), v = Vec3::Zero(), produced = Vec3::Zero();
-  std::size_t heard = 0, felt = 0;
-  // A command acts from some time in the period before its row on (held) or all along it (streamed): a quarter between.
-  const double period = s.t.back() / static_cast<double>(s.size() - 1),
-               age = c.latency + kWindowRules.command_age * period;
-  const auto at_time = [&](const std::vector<Vec3>& x, double t) -> Vec3 {
-    if (heard + 1 >= s.size() || s.t[heard + 1] - s.t[heard] > kWindowRules.held) return x[heard];
-    const double share = std::clamp((t - s.t[heard]) / (s.t[heard + 1] - s.t[heard]), 0.0, 1.0);
-    return x[heard] + share * (x[heard + 1] - x[heard]);
-  };
-  for (std::size_t i = 0; i < s.size(); ++i) {
-    const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
+  Place place(log);
+  State now{log.commands.front().p_W, Vec3::Zero()};
+  Vec3 a = Vec3::Zero();
+  std::size_t felt = 0;
+  for (std::size_t i = 0; i < log.t.size(); ++i) {
+    const double dt = i > 0 ? log.t[i] - log.t[i - 1] : 0;
     const bool gap = dt > kWindowRules.restart;
-    if (gap) p = s.p[i], v = s.v[i];  // start again where the vehicle is
-    const int steps = gap ? 1 : std::max(1, static_cast<int>(std::ceil(dt / kWindowRules.loop_step)));
-    for (int k = 0; k < steps; ++k) {
-      const double h = gap ? 0 : dt / steps, now = s.t[i] - dt + (k + 1) * h;
-      while (heard + 1 < s.size() && s.t[heard + 1] <= now - age + kWindowRules.stamp_error) ++heard;
-      while (felt + 1 < s.size() && s.t[felt + 1] <= now - c.feedback_delay + kWindowRules.stamp_error) ++felt;
-      const Vec3 at = closed ? p : s.p[felt], moving = closed ? v : s.v[felt];
-      const double sent = now - age;
-      const Vec3 wanted = at_time(cmd.a, sent) + kp.cwiseProduct(at_time(cmd.p, sent) - at) +
-                          kd.cwiseProduct(at_time(cmd.v, sent) - moving);
-      const double rate = c.attitude_lag > 0 ? 1 - std::exp(-h / c.attitude_lag) : 1;
-      produced += rate * (wanted - produced);
-      v += h * (produced - drag * Vec3(v.x(), v.y(), 0));
-      p += h * v;
+    if (gap) now = {log.p[i], log.v[i]};
+    for (int k = 0; k < pieces(dt); ++k) {
+      const double h = gap ? 0 : dt / pieces(dt), t = log.t[i] - dt + (k + 1) * h;
+      while (felt + 1 < log.t.size() && log.t[felt + 1] <= t - loop.feedback_delay + kWindowRules.stamp_error) ++felt;
+      const State at = closed ? now : State{log.p[felt], log.v[felt]};
+      a = loop.after(a, loop.asked(place.at(t - loop.latency).command(), at), h);
+      now.v_W += h * (a - drag * Vec3(now.v_W.x(), now.v_W.y(), 0));
+      now.p_W += h * now.v_W;
     }
-    out.p.push_back(p), out.v.push_back(v), out.a.push_back(produced);
+    out.p.push_back(now.p_W);
+    out.v.push_back(now.v_W);
+    out.a.push_back(a);
   }
   return out;
 }
 
-std::vector<std::vector<Vec3>> answers(const Series& s, const Commands& cmd, const Vehicle& vehicle,
-                                       std::span<const double> lags) {
-  const auto& c = vehicle.controller;
-  const Vec3 kp(c.kp.horizontal, c.kp.horizontal, c.kp.vertical), kd(c.kd.horizontal, c.kd.horizontal, c.kd.vertical);
+std::vector<std::vector<Vec3>> answers(const Flown& log, const loop::PositionLoop& loop, std::span<const double> lags) {
+  std::vector<loop::PositionLoop> loops(lags.size(), loop);
+  for (std::size_t n = 0; n < lags.size(); ++n)
+    loops[n].attitude_lag = std::max<double>(kWindowRules.least_lag, lags[n]);
   std::vector<std::vector<Vec3>> out(lags.size());
   std::vector<Vec3> r(lags.size(), Vec3::Zero());
-  std::size_t at = 0;
-  const auto between = [&](const std::vector<Vec3>& x, double t) -> Vec3 {
-    while (at > 0 && s.t[at] > t) --at;
-    while (at + 2 < s.size() && s.t[at + 1] <= t) ++at;
-    const double share = std::clamp((t - s.t[at]) / (s.t[at + 1] - s.t[at]), 0.0, 1.0);
-    return x[at] + share * (x[at + 1] - x[at]);
-  };
-  for (std::size_t i = 0; i < s.size(); ++i) {
-    const double dt = i > 0 ? s.t[i] - s.t[i - 1] : 0;
-    const int steps =
-        dt > kWindowRules.restart ? 1 : std::max(1, static_cast<int>(std::ceil(dt / kWindowRules.loop_step)));
-    for (int k = 0; k < steps; ++k) {
-      const double now = s.t[i] - dt + (k + 0.5) * dt / steps, sent = now - c.latency, felt = now - c.feedback_delay;
-      const Vec3 wanted = between(cmd.a, sent) + kp.cwiseProduct(between(cmd.p, sent) - between(s.p, felt)) +
-                          kd.cwiseProduct(between(cmd.v, sent) - between(s.v, felt));
-      for (std::size_t n = 0; n < lags.size(); ++n)
-        r[n] += (1 - std::exp(-dt / steps / std::max<double>(kWindowRules.least_lag, lags[n]))) * (wanted - r[n]);
+  Place place(log, HUGE_VAL);
+  for (std::size_t i = 0; i < log.t.size(); ++i) {
+    const double dt = i > 0 ? log.t[i] - log.t[i - 1] : 0, h = dt / pieces(dt);
+    for (int k = 0; k < pieces(dt); ++k) {
+      const double now = log.t[i] - dt + (k + 0.5) * h;
+      const Setpoint command = place.at(now - loop.latency).command();
+      const Vec3 u = loop.asked(command, place.at(now - loop.feedback_delay).state());
+      for (std::size_t n = 0; n < lags.size(); ++n) r[n] = loops[n].after(r[n], u, h);
     }
     for (std::size_t n = 0; n < lags.size(); ++n) out[n].push_back(r[n]);
   }

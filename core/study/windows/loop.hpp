@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "core/log/columns/flight_log.hpp"
-#include "core/study/windows/signals/series.hpp"
-#include "core/types/vehicle.hpp"
+#include "core/loop/position_loop.hpp"
 
 /// The position loop of a vehicle file, driven by what a log holds.
 namespace backwash::study {
@@ -18,19 +17,29 @@ std::vector<Vec3> vectors(const log::FlightLog& log, const std::vector<std::size
 
 /// The set-points of a flight: absent velocities and accelerations are zero (docs/interfaces.md). Precondition: it has
 /// positions among them.
-struct Commands {
-  std::vector<Vec3> p, v, a;
+std::vector<Setpoint> commands_of(const log::FlightLog& log, const std::vector<std::size_t>& rows);
+
+/// Two rows of a log or more: times that rise (s), what was measured (W), and the set-points.
+struct Flown {
+  std::span<const double> t;
+  std::span<const Vec3> p, v;
+  std::span<const Setpoint> commands;
 };
-Commands commands_of(const log::FlightLog& log, const std::vector<std::size_t>& rows);
+
+/// The loop with its set-points `command_age` later: a command acts from some time in the period before its row on
+/// (held) or all along it (streamed).
+loop::PositionLoop with_command_age(loop::PositionLoop loop, std::span<const double> t);
 
 struct LoopMotion {
   std::vector<Vec3> p, v, a;
 };
 /// The controller's loop at each row: fed with the logged state, or (`closed`) with its own, against a level drag, 1/s.
-LoopMotion loop_of(const Series& s, const Commands& cmd, const Vehicle& vehicle, bool closed, double drag = 0);
+/// The end of each piece of kWindowRules.loop_step at most is held; after kWindowRules.restart it starts again where
+/// the vehicle is.
+LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, bool closed, double drag = 0);
 
-/// What the loop answers to the logged state, joined between rows as the controller saw it, by each attitude lag, s.
-std::vector<std::vector<Vec3>> answers(const Series& s, const Commands& cmd, const Vehicle& vehicle,
-                                       std::span<const double> lags);
+/// What the loop answers to the logged state at each row, by each attitude lag (s): r of docs/model.md 3-1, m/s². The
+/// middle of each piece of kWindowRules.loop_step at most is held.
+std::vector<std::vector<Vec3>> answers(const Flown& log, const loop::PositionLoop& loop, std::span<const double> lags);
 
 }  // namespace backwash::study

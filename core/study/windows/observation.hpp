@@ -1,25 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
-#include "core/log/columns/flight_log.hpp"
-#include "core/map/occupancy_grid.hpp"
 #include "core/study/windows/gates/gate.hpp"
 #include "core/study/windows/gates/window_rules.hpp"
-#include "core/study/windows/signals/instrument.hpp"
-#include "core/study/windows/signals/rotor_channels.hpp"
-#include "core/study/windows/signals/series.hpp"
-#include "core/study/windows/signals/texture.hpp"
-#include "core/study/windows/stretch.hpp"
+#include "core/study/windows/signals/signals.hpp"
 #include "core/study/windows/surroundings.hpp"
-#include "core/types/model.hpp"
-#include "core/types/vehicle.hpp"
 
 namespace backwash::study {
 
@@ -57,6 +50,12 @@ enum Channel : std::size_t {
 };
 const char* channel_name(Channel c);
 
+/// Value of a channel in one window.
+struct ChannelValue {
+  std::size_t channel;
+  double value, weight;
+};
+
 /// What flights must hold for an effect to be tested: a map, or something above said by map or log; columns of the log.
 enum class Source : std::size_t {
   map,
@@ -87,22 +86,24 @@ struct WindowRow {
   Vec3 p_W, v_W;  ///< m, m/s, means; where the set-points alone lead, if there are any (a gust moves the measured)
   double speed;   ///< m/s, mean of the norm
   std::array<double, kPoints> speeds{}, shares{};  ///< m/s, along the window; of the modelled variance, sum 1
-  Mat3 R_WB;          ///< mean rotation by the heading alone (not orthonormal); zero without attitude
-  double yaw;         ///< rad
-  double thrust_acc;  ///< T/m of the logged command, m/s²; g without thrust
-  double voltage;     ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
+  std::optional<Mat3> R_WB;  ///< mean rotation by the heading alone (not orthonormal); nothing without attitude
+  double thrust_acc;         ///< T/m of the logged command, m/s²; g without thrust
+  double voltage;            ///< V, the flight's slow course: the momentary one answers the thrust, hence the gusts
   double temperature;
   PlaceAround around;             ///< of p_W
   std::vector<PlaceAround> path;  ///< of points along the window; empty where it is one place
-  Vec3 give = Vec3::Zero();     ///< how far a steady push moves the craft off p_W, 1/k_p, s²; 0 where p_W is measured
+  /// Of a window whose p_W and v_W are those of the loop that hears set-points alone.
+  struct Led {
+    Vec3 give = Vec3::Zero();    ///< how far a steady push moves the craft off p_W, 1/k_p, s²
+    Vec3 slowed = Vec3::Zero();  ///< m: what a drag of 1 1/s takes off v_W, by the loop's answer
+    /// Its acceleration, m/s²: the mean and, along the window, the variance, the trend taken out.
+    Vec3 asked_W = Vec3::Zero(), asked2 = Vec3::Zero();
+    Vec3 off_W = Vec3::Zero();  ///< measured place less p_W, m
+  };
+  std::optional<Led> led;       ///< nothing where p_W and v_W are measured
   bool held_off = false;        ///< an integrator holds a steady push off: it moves the craft for some seconds only
-  Vec3 slowed = Vec3::Zero();   ///< m: what a drag of 1 1/s takes off v_W, by the loop's answer; 0 where measured
   Vec3 varied2 = Vec3::Zero();  ///< (m/s)², variance of the velocity along the window, its trend taken out
-  /// Acceleration where the set-points alone lead, m/s²: its mean and, along the window, its variance, the trend taken
-  /// out. 0 where measured.
-  Vec3 asked_W = Vec3::Zero(), asked2 = Vec3::Zero();
-  Vec3 off_W = Vec3::Zero();  ///< measured place less p_W, m; 0 where p_W is measured
-  Vec3 sigma;                 ///< modelled variance per axis, (m/s²)²
+  Vec3 sigma;                   ///< modelled variance per axis, (m/s²)²
   /// ln of Σ per axis with the window moved by each offset (x slowest), less that where it is; within ±offset_limit.
   std::array<Vec3, kOffsetsAside * kOffsetsAside> ln_sigma_moved;
   /// Design of kThrustDelay and kThrustSlope, of (delay, slope); 0 where nothing was excited.
@@ -119,6 +120,10 @@ struct WindowRow {
       lines{};  ///< of the rotors along z, none that cannot be told, the gusts' share taken out of floor2, (m/s²)²
   /// ln_sigma_moved at a level offset, bilinear; as at the edge beyond the square.
   Vec3 ln_sigma_at(const Vec3& offset_W) const;
+  /// Axis of the body in W, by the heading; zero where the attitude is not known: what is fixed to the body is not
+  /// told.
+  Vec3 body_axis(int i) const { return R_WB ? Vec3(R_WB->col(i)) : Vec3(Vec3::Zero()); }
+  double yaw() const { return std::atan2(body_axis(0).y(), body_axis(0).x()); }  ///< rad
 };
 
 /// What is left out, flipped and scattered together: one flight, or the flights of one day. first[k]: the window at
@@ -142,68 +147,6 @@ struct Observations {
   bool measured(Channel c) const;
   /// Units of neighbouring flights with the same value, one a flight.
   void group(const std::vector<double>& by_flight);
-};
-
-/// What an Observer keeps of flights until it is asked: of one flight, all that a study needs of its log. Nothing of
-/// one flight depends on another's, so flights may be looked at anywhere and put together in their order.
-struct Observed {
-  /// Σ z (level, rate)/√Σz² of a window, z the instrument of the delay and that of the slope; their means; its part of
-  /// the first stage.
-  struct ThrustMoments {
-    std::size_t window;
-    std::array<double, 2> delay{}, slope{}, mean{};  // mean: not an instrument's, of the window
-    FirstStage stage{};
-  };
-  Observations seen;
-  std::vector<ThrustMoments> thrust;
-  std::array<DelayStage, 2> command;  ///< level, vertical
-  DelayStage tilt;
-  std::vector<Fourth> tails;   ///< of every window
-  std::set<std::string> ever;  ///< columns that some flight had
-  bool strayed = false;        ///< some flight had set-points that it did not follow
-};
-
-/// Adds a flight to the observations (gates, windows, channels). `grid` and `model` may be null: then no surfaces are
-/// known but the floor at z = 0, and Σ = Σ_0. Real-time status: offline.
-class Observer {
- public:
-  Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid);
-  /// With surroundings that were looked at before, and are kept: studies of the same map share them.
-  Observer(const Vehicle& vehicle, MapView& surroundings);
-  Observer(const Observer&) = delete;
-  void add(const log::FlightLog& log);
-  /// Room for so many windows more: without it the vectors grow by doubling, and hold twice what is seen.
-  void expect(std::size_t windows);
-  /// Flights that another Observer of the same vehicle, model and map looked at, behind these.
-  void add(Observed flights);
-  /// Of the flights so far; none are left here.
-  Observed take();
-  Observations finish();
-  /// As finish() would tell it now; more flights may be added.
-  Observations so_far() const;
-
- private:
-  void add_windows(const log::FlightLog& log, const Series& s, const RotorPhases& rotors,
-                   const std::vector<SampleRange>& good);
-  /// Why the map leaves a window out: far outside of it, or in a solid (map and log contradict each other).
-  std::optional<Gate> misplaced(const Series& s, SampleRange w) const;
-  WindowRow placed(const log::FlightLog& log, const Series& s, SampleRange w);
-  void look_along(WindowRow& row, SampleRange w, const std::vector<Vec3>& p, const std::vector<Vec3>& v);
-  Residual put_means(const WindowRow& row, const Series& s, SampleRange w);
-  void put_delays(const Series& s, SampleRange w);
-  void put_command_delay(const Series& s, SampleRange w, int from, int to);
-  void put_tilt_delay(const Series& s, SampleRange w);
-  void put_spreads(const std::vector<Residual>& residuals, double rate_hz);
-  void put(std::size_t channel, double y, double weight);
-  void smooth_voltage();
-  void follow_thrust();
-  void settle_commands();
-  void put_tails();
-
-  const Vehicle vehicle_;
-  Observed all_;
-  std::optional<MapView> own_;
-  MapView& surroundings_;
 };
 
 }  // namespace backwash::study

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <iterator>
 #include <utility>
 
 namespace backwash::study {
@@ -110,7 +109,7 @@ struct Visitor {
   void visit(RotorLine& l) { (*this)(l.excess, l.amplitude2, l.floor2, l.folded); }
   void visit(Fourth& f) { (*this)(f.at_once, f.apart); }
   void visit(FirstStage& s) { (*this)(s.instruments, s.followed); }
-  void visit(Observed::ThrustMoments& m) { (*this)(m.window, m.delay, m.slope, m.mean, m.stage); }
+  void visit(Delays::ThrustMoments& m) { (*this)(m.window, m.delay, m.slope, m.mean, m.stage); }
   void visit(DelayStage::Seen& s) { (*this)(s.window, s.y, s.design); }
   void visit(DelayStage& stage) {
     auto seen = stage.seen();
@@ -118,15 +117,15 @@ struct Visitor {
     stage = {};
     for (const auto& s : seen) stage.add(s.window, s.y, s.design);
   }
+  void visit(Delays& d) { (*this)(d.thrust, d.command, d.tilt); }
+  void visit(WindowRow::Led& l) { (*this)(l.give, l.slowed, l.asked_W, l.asked2, l.off_W); }
   /// The names are counted by the compiler: a field that is new in WindowRow has to be named here, too.
   void visit(WindowRow& row) {
-    auto& [flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, yaw, thrust_acc, voltage, temperature,
-           around, path, give, held_off, slowed, varied2, asked_W, asked2, off_W, sigma, ln_sigma_moved, delay_gain,
-           slope_gain, mean_gain, delay_at, slope_at, climbs, command_gain, lag_gain, tilt_gain, measured_variance,
-           lines] = row;
-    (*this)(flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, yaw, thrust_acc, voltage);
-    (*this)(temperature, around, path, give, held_off, slowed, varied2, asked_W, asked2, off_W, sigma, ln_sigma_moved,
-            delay_gain);
+    auto& [flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, thrust_acc, voltage, temperature,
+           around, path, led, held_off, varied2, sigma, ln_sigma_moved, delay_gain, slope_gain, mean_gain, delay_at,
+           slope_at, climbs, command_gain, lag_gain, tilt_gain, measured_variance, lines] = row;
+    (*this)(flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, thrust_acc, voltage);
+    (*this)(temperature, around, path, led, held_off, varied2, sigma, ln_sigma_moved, delay_gain);
     (*this)(slope_gain, mean_gain, delay_at, slope_at, climbs, command_gain, lag_gain, tilt_gain, measured_variance);
     visit(lines);
   }
@@ -140,8 +139,8 @@ struct Visitor {
 
  public:
   void visit(Observed& all) {
-    auto& [seen, thrust, command, tilt, tails, ever, strayed] = all;
-    (*this)(seen, thrust, command, tilt, tails, strayed);
+    auto& [seen, delays, tails, ever, strayed] = all;
+    (*this)(seen, delays, tails, strayed);
     visit_as<std::string>(ever);
   }
 };
@@ -161,8 +160,8 @@ bool sound(const Observed& all) {
   return seen.first.size() == seen.flights + 1 && seen.first.front() == 0 && seen.first.back() == n &&
          std::ranges::is_sorted(seen.first) && measured(seen.y) && measured(seen.weight) && all.tails.size() == n &&
          std::ranges::all_of(seen.windows, [&](auto& row) { return sound(row) && row.flight < seen.flights; }) &&
-         within(all.thrust) && within(all.command[0].seen()) && within(all.command[1].seen()) &&
-         within(all.tilt.seen());
+         within(all.delays.thrust) && within(all.delays.command[0].seen()) && within(all.delays.command[1].seen()) &&
+         within(all.delays.tilt.seen());
 }
 
 }  // namespace
@@ -179,51 +178,6 @@ std::optional<Observed> unpacked(std::string_view bytes) {
   Visitor<Unpacker>{unpacker}.visit(flights);
   if (!unpacker.good || !unpacker.bytes.empty() || !sound(flights)) return std::nullopt;
   return flights;
-}
-
-Observations Observer::so_far() const {
-  Observer copy(vehicle_, surroundings_);
-  copy.all_ = all_;
-  return copy.finish();
-}
-
-Observed Observer::take() {
-  Observed taken = std::exchange(all_, {});
-  all_.seen.first.push_back(0);
-  return taken;
-}
-
-void Observer::expect(std::size_t windows) {
-  const std::size_t all = all_.seen.windows.size() + windows;
-  all_.seen.windows.reserve(all);
-  for (std::size_t c = 0; c < kChannels; ++c) {
-    all_.seen.y[c].reserve(all);
-    all_.seen.weight[c].reserve(all);
-  }
-}
-
-void Observer::add(Observed flights) {
-  Observations &seen = all_.seen, &more = flights.seen;
-  const std::size_t windows = seen.windows.size();
-  for (auto& row : more.windows) row.flight += seen.flights;
-  std::ranges::move(more.windows, std::back_inserter(seen.windows));
-  for (std::size_t c = 0; c < kChannels; ++c) {
-    seen.y[c].insert(seen.y[c].end(), more.y[c].begin(), more.y[c].end());
-    seen.weight[c].insert(seen.weight[c].end(), more.weight[c].begin(), more.weight[c].end());
-  }
-  seen.flights += more.flights;
-  for (std::size_t f = 1; f < more.first.size(); ++f) seen.first.push_back(windows + more.first[f]);
-  seen.row_period = std::max(seen.row_period, more.row_period);
-  for (const auto& [gate, count] : more.gated_out) seen.gated_out[gate] += count;
-  for (auto& moments : flights.thrust) {
-    moments.window += windows;
-    all_.thrust.push_back(moments);
-  }
-  for (std::size_t k = 0; k < all_.command.size(); ++k) all_.command[k].add(flights.command[k], windows);
-  all_.tilt.add(flights.tilt, windows);
-  all_.tails.insert(all_.tails.end(), flights.tails.begin(), flights.tails.end());
-  all_.ever.merge(flights.ever);
-  all_.strayed = all_.strayed || flights.strayed;
 }
 
 }  // namespace backwash::study

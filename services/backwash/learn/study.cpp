@@ -6,6 +6,7 @@
 #include "core/study/findings/residuals.hpp"
 #include "core/study/findings/study_page.hpp"
 #include "core/study/inference/rotors/rotor_reference.hpp"
+#include "core/study/windows/observer.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/learn/calibrate_input.hpp"
 #include "services/backwash/learn/study_design.hpp"

@@ -12,6 +12,7 @@
 #include "core/log/columns/import_columns.hpp"
 #include "core/log/columns/median.hpp"
 #include "core/log/raw/raw_flight.hpp"
+#include "core/study/windows/observer.hpp"
 #include "core/study/windows/signals/same_gusts.hpp"
 #include "core/types/formatted.hpp"
 #include "services/backwash/files.hpp"

@@ -8,7 +8,7 @@
 #include "core/log/autopilot/same_flight.hpp"
 #include "core/log/columns/flight_log.hpp"
 #include "core/map/occupancy_grid.hpp"
-#include "core/study/windows/observation.hpp"
+#include "core/study/windows/observed.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
 

@@ -2,6 +2,7 @@
 #include "services/backwash/learn/study_simulation.hpp"
 
 #include "core/sim/setpoint_flight.hpp"
+#include "core/study/windows/observer.hpp"
 #include "services/backwash/verb.hpp"
 #include "services/parallel/parallel.hpp"
 

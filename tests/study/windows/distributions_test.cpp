@@ -9,7 +9,7 @@
 
 #include "core/config/config.hpp"
 #include "core/study/inference/intervals.hpp"
-#include "core/study/windows/observed.hpp"
+#include "core/study/windows/observer.hpp"
 
 namespace backwash::study {
 namespace {

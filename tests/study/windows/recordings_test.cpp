@@ -9,6 +9,7 @@
 #include "core/map/occupancy_grid.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/inference/evidence.hpp"
+#include "core/study/windows/observer.hpp"
 
 namespace {
 
@@ -140,7 +141,6 @@ Days days(std::mt19937& rng) {
         row.flight = static_cast<std::size_t>(4 * day + flight);
         row.sigma = Vec3::Ones();
         row.p_W = row.v_W = row.measured_variance = Vec3::Zero();
-        row.R_WB = Mat3::Zero();
         made.seen.windows.push_back(row);
         const double y = level + 0.5 * normal(rng);
         for (std::size_t c = 0; c < kChannels; ++c) {

@@ -10,7 +10,7 @@
 #include "core/config/config.hpp"
 #include "core/sim/vehicle/quadrotor.hpp"
 #include "core/sim/vehicle/vio.hpp"
-#include "core/study/windows/observation.hpp"
+#include "core/study/windows/observer.hpp"
 
 namespace backwash::study {
 namespace {
@@ -122,8 +122,11 @@ std::vector<double> autoregressive(double rho, std::size_t n, std::uint64_t seed
 
 TEST(Windows, DividesOutTheAttenuationOfTheLoopWithoutSetPoints) {
   // The two figures of docs/model.md section 3, from residues (closed form) for a second-order loop without band.
-  EXPECT_NEAR(loop_attenuation({6, 4, 0, 0}, 0.2, {}), 0.64, 0.005);
-  EXPECT_NEAR(loop_attenuation({6, 4, 0, 0}, 0.5, {}), 0.39, 0.005);
+  loop::PositionLoop loop;
+  loop.kp.setConstant(6);
+  loop.kd.setConstant(4);
+  EXPECT_NEAR(loop_attenuation(loop, 0, 0.2, {}), 0.64, 0.005);
+  EXPECT_NEAR(loop_attenuation(loop, 0, 0.5, {}), 0.39, 0.005);
   // A push of that correlation time, through the simulated vehicle, logged without set-points.
   auto vehicle = five_inch();
   vehicle.controller.kp = {6, 6};

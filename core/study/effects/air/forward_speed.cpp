@@ -14,7 +14,8 @@ double speed_power(const WindowRow& w, double power) {
 
 /// What gusts add to the square of the speed, (m/s)²: of a critically damped loop Σ τ_w/(2 √k_p) along each axis. Of
 /// the modelled Σ: what is measured answers the gusts.
-double sway2(const WindowRow& w) { return kWindowRules.tau_w * w.sigma.dot(w.give.cwiseSqrt()) / 2; }
+/// None where the speed is measured, and has them in it.
+double sway2(const WindowRow& w) { return w.led ? kWindowRules.tau_w * w.sigma.dot(w.led->give.cwiseSqrt()) / 2 : 0; }
 
 /// What is left of the gusts at a place along a window, a share of its length from the middle, when mean and trend are
 /// taken out: 1 − (1 + 12 u²) 2τ_w/T, as far as their correlation lies within the window.

@@ -12,7 +12,7 @@ template <typename F>
 std::vector<DesignColumn> against(const Windows& ws, const Scale& scale, F per_speed) {
   const double k = scale.anchor.empty() ? 0 : scale.anchor[0];
   DesignColumn column = level(ws, [&](auto& w) -> Vec3 {
-    const Vec3 v = w.v_W - k * w.slowed;
+    const Vec3 v = w.led ? Vec3(w.v_W - k * w.led->slowed) : w.v_W;
     const double told = w.v_W.template head<2>().norm(), speed = v.template head<2>().norm();
     double way = 0, dragged = 0;
     for (std::size_t i = 0; i < kPoints && told > 0; ++i) {

@@ -9,8 +9,8 @@ namespace {
 
 /// The bias with which a drift begins.
 std::vector<DesignColumn> first_bias(const Windows& ws) {
-  return {level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(0); }),
-          level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); }), in(kMeanZ, ws, [](auto&) { return 1.0; })};
+  return {level(ws, [](auto& w) -> Vec3 { return w.body_axis(0); }),
+          level(ws, [](auto& w) -> Vec3 { return w.body_axis(1); }), in(kMeanZ, ws, [](auto&) { return 1.0; })};
 }
 
 using Kind = SimulationTerm::Kind;

@@ -17,20 +17,19 @@ Effect trim() {
                      .needs = {Source::attitude},
                      .columns =
                          [](const Windows& ws, const Scale&) {
-                           return std::vector{level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(0); }),
-                                              level(ws, [](auto& w) -> Vec3 { return w.R_WB.col(1); })};
+                           return std::vector{level(ws, [](auto& w) -> Vec3 { return w.body_axis(0); }),
+                                              level(ws, [](auto& w) -> Vec3 { return w.body_axis(1); })};
                          },
                      .extend = unknown_push,
                      .simulate = simulates(SimulationTerm::Kind::push_of_heading)}},
-          .axis = {"yaw, rad", false, [](auto& w) { return w.yaw; }},
+          .axis = {"yaw, rad", false, [](auto& w) { return w.yaw(); }},
           .remedy =
               [](auto&, auto&) {
                 return with_craft(
                     "Level the craft anew: calibrate the autopilot's level horizon, and look for a bent arm or motor.");
               },
           .manoeuvres = {{"turn a full yaw turn on the spot, far from walls", [](WindowRow& w, double s) {
-                            w.yaw = 2 * std::numbers::pi * s;
-                            w.R_WB = Eigen::AngleAxisd(w.yaw, Vec3::UnitZ()).toRotationMatrix();
+                            w.R_WB = Eigen::AngleAxisd(2 * std::numbers::pi * s, Vec3::UnitZ()).toRotationMatrix();
                             w.around.walls.clear();
                           }}}};
 }

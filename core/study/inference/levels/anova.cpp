@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/inference/levels/anova.hpp"
+
 #include <algorithm>
 #include <map>
 #include <optional>
 #include <utility>
+#include <vector>
 
-#include "core/study/inference/evidence.hpp"
 #include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
@@ -31,51 +33,55 @@ std::optional<double> between_by_moments(const std::vector<Unit>& members, doubl
 
 }  // namespace
 
-void Evidence::anova(Channel c, const std::vector<double>& r) {
+double built_scatter(Channel c) {
+  return c >= kDropout1 ? kRules.dropout_scatter : c >= kMotor1 ? kRules.motor_scatter.value : 0;
+}
+
+Scatter anova(Channel c, std::span<const double> r, std::span<const double> weight, const Units& of,
+              std::span<const std::size_t> flight_end) {
   double sse = 0, n = 0;
   std::vector<Unit> flights;
-  for (std::size_t f = 0; f < seen_->units.size(); ++f) {
-    for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1];) {
-      double weight = 0, sum = 0, square = 0, count = 0;
-      for (const std::size_t end = flight_end_[i]; i < end; ++i) {
-        const double w = weight_[c][i];
-        weight += w;
+  for (std::size_t f = 0; f < of.size(); ++f) {
+    for (std::size_t i = of.first[f]; i < of.first[f + 1];) {
+      double whole = 0, sum = 0, square = 0, count = 0;
+      for (const std::size_t end = flight_end[i]; i < end; ++i) {
+        const double w = weight[i];
+        whole += w;
         sum += w * r[i];
         square += w * r[i] * r[i];
         count += w > 0 ? 1 : 0;
       }
       if (count == 0) continue;
-      sse += square - sum * sum / weight;
+      sse += square - sum * sum / whole;
       n += count;
-      flights.push_back({f, weight, sum / weight});
+      flights.push_back({f, whole, sum / whole});
     }
   }
   // A channel that is exact in every window (no dropout at all) keeps a least scatter.
   const double least = c >= kMotor1 ? kRules.least_rotor_scatter : kRules.least_scatter,
                groups = static_cast<double>(flights.size());
-  within_[c] = n > groups ? std::max(sse / (n - groups), least) : 1;
+  Scatter found{n > groups ? std::max(sse / (n - groups), least) : 1, 0, 0};
   const double built = built_scatter(c);
-  const auto inside = between_by_moments(flights, within_[c]);  // units of several flights: days
+  const auto inside = between_by_moments(flights, found.within);  // units of several flights: days
   std::vector<Unit> units;
   if (!inside)
     units = std::exchange(flights, {});
   else
-    between_[c] = std::max(built * built, *inside);
+    found.between = std::max(built * built, *inside);
   for (const auto& f : flights) {
-    const double w = 1 / (within_[c] / f.weight + between_[c]);
+    const double w = 1 / (found.within / f.weight + found.between);
     if (units.empty() || units.back().group != f.group) units.push_back({f.group, 0, 0});
     auto& unit = units.back();
     unit.mean += w / (unit.weight + w) * (f.mean - unit.mean);
     unit.weight += w;
   }
   for (auto& unit : units) unit.group = 0;
-  const double across = between_by_moments(units, inside ? 1 : within_[c]).value_or(0);
+  const double across = between_by_moments(units, inside ? 1 : found.within).value_or(0);
   if (inside)
-    unit_[c] = std::max(0.0, across);
-  else {
-    between_[c] = std::max(built * built, across);
-    unit_[c] = 0;
-  }
+    found.units = std::max(0.0, across);
+  else
+    found.between = std::max(built * built, across);
+  return found;
 }
 
 }  // namespace backwash::study

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <numbers>
 
 namespace backwash::study {
@@ -71,12 +70,7 @@ std::vector<double> band_passed(std::span<const double> signal, double rate_hz, 
   return {x.begin() + static_cast<std::ptrdiff_t>(pad), x.begin() + static_cast<std::ptrdiff_t>(pad + n)};
 }
 
-double PositionLoop::passes(double f_hz) const {
-  const std::complex<double> s(0, 2 * std::numbers::pi * f_hz);
-  return std::norm(1.0 / (1.0 + (k_p + k_d * s) * std::exp(-s * delay_s) / (s * s * (1.0 + lag_s * s))));
-}
-
-double loop_attenuation(const PositionLoop& loop, double tau_w, const std::optional<Band>& band) {
+double loop_attenuation(const loop::PositionLoop& loop, int axis, double tau_w, const std::optional<Band>& band) {
   // Even steps in ln f: the integrand is smooth in it from far below to far above every corner.
   const double low = std::log(band ? band->low_hz : kWindowRules.integral_low),
                high = std::log(band ? band->high_hz : kWindowRules.integral_high / tau_w);
@@ -85,7 +79,7 @@ double loop_attenuation(const PositionLoop& loop, double tau_w, const std::optio
   for (int i = 0; i < steps; ++i) {
     const double f = std::exp(low + (high - low) * (i + 0.5) / steps), omega = 2 * std::numbers::pi * f;
     const double density = f / (1 + omega * omega * tau_w * tau_w);
-    passed += density * loop.passes(f);
+    passed += density * loop.passes(axis, f);
     whole += density;
   }
   return passed / whole;

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "core/loop/position_loop.hpp"
 #include "core/study/windows/gates/window_rules.hpp"
-#include "core/types/vehicle.hpp"
 
 namespace backwash::study {
 
@@ -25,17 +25,9 @@ struct Band {
 /// Precondition: rate_hz > 2·high_hz, n ≥ 2.
 std::vector<double> band_passed(std::span<const double> signal, double rate_hz, const Band& band);
 
-/// A closed position loop held at rest, along one axis: gains (1/s², 1/s), age of the state it feels, attitude lag (s).
-struct PositionLoop {
-  double k_p, k_d, delay_s, lag_s;
-  /// |H(f)|², what of a disturbance's power at f (Hz, > 0) is left in the acceleration:
-  /// H(s) = 1/(1 + (k_p + k_d s) e^(−s·delay)/(s² (1 + lag s))) (docs/model.md section 3).
-  double passes(double f_hz) const;
-};
-
-/// var(a)/var(w) of a loop, for a disturbance w of correlation time tau_w (s; spectrum 1/(1 + (2πfτ)²)): ∫|H|²S / ∫S
-/// (docs/model.md section 3; 0.64 at τ = 0.2 s and 0.39 at 0.5 s for gains (6, 4)). With a band, both integrals run
-/// over it; without, over all frequencies. Numerical, relative error below 1e-4.
-double loop_attenuation(const PositionLoop& loop, double tau_w, const std::optional<Band>& band);
+/// var(a)/var(w) of a loop along an axis, for a disturbance w of correlation time tau_w (s; spectrum 1/(1 + (2πfτ)²)):
+/// ∫|H|²S / ∫S (docs/model.md section 3; 0.64 at τ = 0.2 s and 0.39 at 0.5 s for gains (6, 4)). With a band, both
+/// integrals run over it; without, over all frequencies. Numerical, relative error below 1e-4.
+double loop_attenuation(const loop::PositionLoop& loop, int axis, double tau_w, const std::optional<Band>& band);
 
 }  // namespace backwash::study

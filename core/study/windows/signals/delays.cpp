@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "core/study/windows/signals/delays.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-
-#include "core/study/windows/observation.hpp"
+#include <optional>
 
 namespace backwash::study {
 namespace {
@@ -37,57 +38,23 @@ std::vector<double> about_mean(SampleRange w, F value) {
   return x;
 }
 
-}  // namespace
-
-/// How late and how steeply thrust and commands act.
-void Observer::put_delays(const Series& s, SampleRange w) {
-  const auto nominal = [&](int axis) { return [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; }; };
-  if (s.simulated_by_thrust) {
-    // Instrument and design both come from the set-points alone: the logged thrust also answers the gusts, and a
-    // design that shares their noise with the residual would be biased.
-    // Their means alone are taken out: up and down once in 3 to 5 s, half of what was asked for is a window's trend.
-    const auto r = about_mean(w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i] - s.a_sim[i]); });
-    const auto rate = about_mean(w, slope_at(s, nominal(2))), level = about_mean(w, nominal(2));
-    // A steeper curve adds a share of what was commanded; a first-order lag takes τ times the rate of what came of it.
-    const auto flown = about_mean(w, [&](std::size_t i) { return s.thrust_acc[i]; });
-    const auto along = [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i]); };
-    const auto flown_rate = about_mean(w, slope_at(s, along));
-    const Moment delay(rate), slope(level);
-    Observed::ThrustMoments moments{all_.seen.windows.size() - 1};
-    for (std::size_t i = w.begin; i < w.end; ++i) moments.mean[0] += s.a_nominal[i].z() / static_cast<double>(w.size());
-    moments.mean[1] = (s.a_nominal[w.end - 1].z() - s.a_nominal[w.begin].z()) / (s.t[w.end - 1] - s.t[w.begin]);
-    WindowRow& row = all_.seen.windows.back();
-    const bool late = delay.excited(kWindowRules.excited_rate), steep = slope.excited(kWindowRules.excited_level);
-    if (late) {
-      moments.delay = {delay.with(level), delay.with(rate)};
-      row.delay_at = delay.at_points<kPoints>();
-      put(kThrustDelay, delay.with(r), 1);
-    }
-    if (steep) {
-      moments.slope = {slope.with(level), slope.with(rate)};
-      row.slope_at = slope.at_points<kPoints>();
-      put(kThrustSlope, slope.with(r), 1);
-    }
-    if (late || steep) {
-      moments.stage.add({level, rate}, {flown, flown_rate});
-      all_.thrust.push_back(moments);
-    }
-  }
-  put_command_delay(s, w, 0, 2);
-  put_command_delay(s, w, 2, 3);
-  if (s.simulated_by_thrust) put_tilt_delay(s, w);
-}
+/// What a window says of a delay: its value, its design, and that of a longer lag of the attitude, each over √Σx².
+struct Late {
+  double y;
+  DelayStage::PerSecond design;
+  double lagging = 0;
+};
 
 /// How late the attitude follows what the loop asks of it, in hover: there the loop answers gusts alone, by the
 /// measured state, and set-points that act late change nothing. Slow answers alone count: there a loop of any order
 /// with the same mean lateness follows alike, and at 10 rad/s one of second order is 30 ms later than one of first.
-void Observer::put_tilt_delay(const Series& s, SampleRange w) {
+std::optional<Late> tilt_delay(const Series& s, SampleRange w) {
   double y = 0, square = 0;
   DelayStage::PerSecond design{};
   constexpr std::size_t kOwn = 2;  // of kShifts
   for (int axis = 0; axis < 2; ++axis) {
     const auto nominal = [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; };
-    if (Moment(rates(s, w, nominal)).excited(kWindowRules.excited_rate)) return;
+    if (Moment(rates(s, w, nominal)).excited(kWindowRules.excited_rate)) return std::nullopt;
     const auto answer = [&s, axis](std::size_t i) { return s.answer[kOwn][i][axis]; };
     const Moment m(slow(s, w, rates(s, w, answer), kWindowRules.slow_tilt));
     if (!m.excited(kWindowRules.excited_rate)) continue;
@@ -100,15 +67,14 @@ void Observer::put_tilt_delay(const Series& s, SampleRange w) {
       design[k] += -norm * m.with(detrended_values(w, later)) / kShifts[k];
     }
   }
-  if (!(square > 0)) return;
+  if (!(square > 0)) return std::nullopt;
   design[kOwn] = 0.5 * (design[kOwn - 1] + design[kOwn + 1]);
   for (double& g : design) g /= std::sqrt(square);
-  put(kTiltDelay, y / std::sqrt(square), 1);
-  all_.tilt.add(all_.seen.windows.size() - 1, y / std::sqrt(square), design);
+  return Late{y / std::sqrt(square), design};
 }
 
-/// Of axes `from` … `to` − 1, along the nominal rate of each.
-void Observer::put_command_delay(const Series& s, SampleRange w, int from, int to) {
+/// How late set-points act, of axes `from` … `to` − 1, along the nominal rate of each.
+std::optional<Late> command_delay(const Series& s, SampleRange w, int from, int to) {
   double y = 0, square = 0, lagging = 0;
   DelayStage::PerSecond design{};
   for (int axis = from; axis < to; ++axis) {
@@ -124,35 +90,87 @@ void Observer::put_command_delay(const Series& s, SampleRange w, int from, int t
       design[k] += kShifts[k] != 0 ? -norm * m.with(detrended_values(w, later)) / kShifts[k] : m.square;
     }
   }
-  if (!(square > 0)) return;
+  if (!(square > 0)) return std::nullopt;
   for (double& d : design) d /= std::sqrt(square);
-  const std::size_t channel = from == 0 ? kCommandDelayH : kCommandDelayZ;
-  put(channel, y / std::sqrt(square), 1);
-  all_.seen.windows.back().lag_gain[channel - kCommandDelayH] = lagging / kWindowRules.more_lag / std::sqrt(square);
-  all_.command[channel - kCommandDelayH].add(all_.seen.windows.size() - 1, y / std::sqrt(square), design);
+  return Late{y / std::sqrt(square), design, lagging / kWindowRules.more_lag / std::sqrt(square)};
 }
 
-void Observer::settle_commands() {
-  for (std::size_t k = 0; k < all_.command.size(); ++k)
-    for (const auto& [window, design] : all_.command[k].designs()) all_.seen.windows[window].command_gain[k] = design;
-  for (const auto& [window, design] : all_.tilt.designs()) all_.seen.windows[window].tilt_gain = design;
+}  // namespace
+
+std::vector<ChannelValue> Delays::add(const Series& s, SampleRange w, std::size_t number, WindowRow& row) {
+  std::vector<ChannelValue> values;
+  const auto nominal = [&](int axis) { return [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; }; };
+  if (s.simulated_by_thrust) {
+    // Instrument and design both come from the set-points alone: the logged thrust also answers the gusts, and a
+    // design that shares their noise with the residual would be biased.
+    // Their means alone are taken out: up and down once in 3 to 5 s, half of what was asked for is a window's trend.
+    const auto r = about_mean(w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i] - s.a_sim[i]); });
+    const auto rate = about_mean(w, slope_at(s, nominal(2))), level = about_mean(w, nominal(2));
+    // A steeper curve adds a share of what was commanded; a first-order lag takes τ times the rate of what came of it.
+    const auto flown = about_mean(w, [&](std::size_t i) { return s.thrust_acc[i]; });
+    const auto along = [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i]); };
+    const auto flown_rate = about_mean(w, slope_at(s, along));
+    const Moment delay(rate), slope(level);
+    ThrustMoments moments{number};
+    for (std::size_t i = w.begin; i < w.end; ++i) moments.mean[0] += s.a_nominal[i].z() / static_cast<double>(w.size());
+    moments.mean[1] = (s.a_nominal[w.end - 1].z() - s.a_nominal[w.begin].z()) / (s.t[w.end - 1] - s.t[w.begin]);
+    const bool late = delay.excited(kWindowRules.excited_rate), steep = slope.excited(kWindowRules.excited_level);
+    if (late) {
+      moments.delay = {delay.with(level), delay.with(rate)};
+      row.delay_at = delay.at_points<kPoints>();
+      values.push_back({kThrustDelay, delay.with(r), 1});
+    }
+    if (steep) {
+      moments.slope = {slope.with(level), slope.with(rate)};
+      row.slope_at = slope.at_points<kPoints>();
+      values.push_back({kThrustSlope, slope.with(r), 1});
+    }
+    if (late || steep) {
+      moments.stage.add({level, rate}, {flown, flown_rate});
+      thrust.push_back(moments);
+    }
+  }
+  for (std::size_t k = 0; k < command.size(); ++k)
+    if (const auto late = k == 0 ? command_delay(s, w, 0, 2) : command_delay(s, w, 2, 3)) {
+      values.push_back({kCommandDelayH + k, late->y, 1});
+      row.lag_gain[k] = late->lagging;
+      command[k].add(number, late->y, late->design);
+    }
+  if (!s.simulated_by_thrust) return values;
+  if (const auto late = tilt_delay(s, w)) {
+    values.push_back({kTiltDelay, late->y, 1});
+    tilt.add(number, late->y, late->design);
+  }
+  return values;
 }
 
-/// Designs of (delay, slope): the moments with −ȧ and T/m − g as they follow z.
-void Observer::follow_thrust() {
+void Delays::add(const Delays& other, std::size_t first) {
+  for (ThrustMoments moments : other.thrust) {
+    moments.window += first;
+    thrust.push_back(moments);
+  }
+  for (std::size_t k = 0; k < command.size(); ++k) command[k].add(other.command[k], first);
+  tilt.add(other.tilt, first);
+}
+
+// Of (delay, slope): the moments with −ȧ and T/m − g as they follow z.
+void Delays::settle(std::vector<WindowRow>& windows) const {
   FirstStage whole;
-  for (const auto& moments : all_.thrust) whole.add(moments.stage);
+  for (const auto& moments : thrust) whole.add(moments.stage);
   const Eigen::Matrix2d follows = whole.coefficients();
   const auto design = [&](const std::array<double, 2>& moment) {
     const Eigen::RowVector2d flown = Eigen::RowVector2d(moment[0], moment[1]) * follows;
     return std::array<double, 2>{-flown[1], flown[0]};
   };
-  for (const auto& [window, delay, slope, mean, own] : all_.thrust) {
-    WindowRow& row = all_.seen.windows[window];
+  for (const auto& [window, delay, slope, mean, own] : thrust) {
+    WindowRow& row = windows[window];
     row.delay_gain = design(delay);
     row.slope_gain = design(slope);
     row.mean_gain = design(mean);
   }
+  for (std::size_t k = 0; k < command.size(); ++k)
+    for (const auto& [window, per_second] : command[k].designs()) windows[window].command_gain[k] = per_second;
+  for (const auto& [window, per_second] : tilt.designs()) windows[window].tilt_gain = per_second;
 }
 
 }  // namespace backwash::study

@@ -13,6 +13,13 @@
 
 namespace backwash::study {
 
+/// Mean of value(i) over a window; `sum`: zero.
+template <typename T, typename F>
+T mean_over(SampleRange w, T sum, F value) {
+  for (std::size_t i = w.begin; i < w.end; ++i) sum += value(i) / static_cast<double>(w.size());
+  return sum;
+}
+
 template <typename F>
 std::vector<double> detrended_values(SampleRange w, F value) {
   std::vector<double> x;

@@ -8,7 +8,6 @@
 
 #include "core/log/columns/median.hpp"
 #include "core/study/windows/gates/window_rules.hpp"
-#include "core/study/windows/observation.hpp"
 #include "core/study/windows/signals/signals.hpp"
 
 namespace backwash::study {
@@ -53,11 +52,11 @@ RotorPhases rotor_phases(const log::FlightLog& log, const Series& s) {
   return phases;
 }
 
-std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
-                                     const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
-                                     std::size_t end, std::size_t turn,
-                                     std::array<std::optional<RotorLine>, 4>& lines) {
-  std::vector<RotorValue> values;
+std::vector<ChannelValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
+                                       const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
+                                       std::size_t end, std::size_t turn,
+                                       std::array<std::optional<RotorLine>, 4>& lines) {
+  std::vector<ChannelValue> values;
   std::array<double, 4> share{}, ratio{};
   bool motors = true, rpms = true;
   const std::span<const double> t(s.t.data() + begin, end - begin);

@@ -5,8 +5,8 @@
 #include <optional>
 #include <span>
 
+#include "core/study/windows/observation.hpp"
 #include "core/study/windows/signals/series.hpp"
-#include "core/study/windows/signals/signals.hpp"
 
 namespace backwash::study {
 
@@ -15,16 +15,12 @@ namespace backwash::study {
 using RotorPhases = std::array<std::vector<double>, 4>;
 RotorPhases rotor_phases(const log::FlightLog& log, const Series& s);
 
-/// Value of a rotor channel (observation.hpp) in one window.
-struct RotorValue {
-  std::size_t channel;
-  double value, weight;
-};
 /// Lines, motor shares, rpm against command and dropouts of the rows [begin, end). `residual`: detrended vertical
 /// residual of those rows, m/s². `lines`: each rotor's, where the log tells its rate. Rotors of one rate have one line,
 /// which must not count several times: it is the value of one of them, of each in `turn` (the window's number).
-std::vector<RotorValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
-                                     const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
-                                     std::size_t end, std::size_t turn, std::array<std::optional<RotorLine>, 4>& lines);
+std::vector<ChannelValue> rotor_values(const log::FlightLog& log, const Series& s, const RotorPhases& phases,
+                                       const Vehicle& vehicle, std::span<const double> residual, std::size_t begin,
+                                       std::size_t end, std::size_t turn,
+                                       std::array<std::optional<RotorLine>, 4>& lines);
 
 }  // namespace backwash::study

@@ -25,7 +25,7 @@ std::vector<Vec3> derivative(const std::vector<double>& t, const std::vector<Vec
 
 /// Whether the craft flew where its set-points are, or where the loop would have led it, in half of the rows at least.
 /// Zeros beside commanded velocities, or positions of another frame, are no set-points that a loop has heard.
-bool follows(const Series& s, const Commands& cmd, const LoopMotion& nominal, const Vehicle& vehicle) {
+bool follows(const Series& s, std::span<const Setpoint> commands, const LoopMotion& nominal, const Vehicle& vehicle) {
   const double sunk = kWindowRules.stray + kWindowRules.sunk * kGravity / vehicle.controller.kp.vertical;
   std::size_t far = 0;
   for (std::size_t i = 0; i < s.size(); ++i) {
@@ -33,7 +33,7 @@ bool follows(const Series& s, const Commands& cmd, const LoopMotion& nominal, co
       const Vec3 off = s.p[i] - p_W;
       return off.head<2>().norm() <= kWindowRules.stray && std::abs(off.z()) <= sunk;
     };
-    far += near(cmd.p[i]) || near(nominal.p[i]) ? 0u : 1u;
+    far += near(commands[i].p_W) || near(nominal.p[i]) ? 0u : 1u;
   }
   return 2 * far <= s.size();
 }
@@ -66,19 +66,21 @@ void read_attitude(Series& s, const log::FlightLog& log, const RowNumbers& rows)
 }
 
 /// What the set-points lead to, unless the craft flew elsewhere.
-void read_commands(Series& s, const Commands& cmd, const Vehicle& vehicle) {
-  LoopMotion nominal = loop_of(s, cmd, vehicle, true);
-  s.strayed = !follows(s, cmd, nominal, vehicle);
+void read_commands(Series& s, std::span<const Setpoint> commands, const Vehicle& vehicle) {
+  const Flown flown{s.t, s.p, s.v, commands};
+  const loop::PositionLoop told(vehicle), loop = with_command_age(told, s.t);
+  LoopMotion nominal = loop_of(flown, loop, true);
+  s.strayed = !follows(s, commands, nominal, vehicle);
   if (s.strayed) return;
-  if (!s.simulated_by_thrust) s.a_sim = loop_of(s, cmd, vehicle, false).a;
-  Vehicle lagging = vehicle;
-  lagging.controller.attitude_lag += kWindowRules.more_lag;
-  s.a_lagging = loop_of(s, cmd, lagging, true).a;
-  s.v_dragged = loop_of(s, cmd, vehicle, true, kWindowRules.loop_drag).v;
+  if (!s.simulated_by_thrust) s.a_sim = loop_of(flown, loop, false).a;
+  loop::PositionLoop lagging = loop;
+  lagging.attitude_lag += kWindowRules.more_lag;
+  s.a_lagging = loop_of(flown, lagging, true).a;
+  s.v_dragged = loop_of(flown, loop, true, kWindowRules.loop_drag).v;
   if (s.simulated_by_thrust) {
     std::array<double, kShifts.size()> lags;
-    for (std::size_t n = 0; n < lags.size(); ++n) lags[n] = vehicle.controller.attitude_lag + kShifts[n];
-    auto found = answers(s, cmd, vehicle, lags);
+    for (std::size_t n = 0; n < lags.size(); ++n) lags[n] = told.attitude_lag + kShifts[n];
+    auto found = answers(flown, told, lags);
     std::ranges::move(found, s.answer.begin());
   }
   s.p_nominal = std::move(nominal.p);
