@@ -170,7 +170,8 @@ std::vector<Requirement> gates(const std::vector<CellSummary>& cells) {
 
 std::string markdown(const std::vector<CellSummary>& cells, const std::vector<WorldOutcome>& outcomes) {
   std::string page =
-      "| hidden | right name alone | truth in what is reported | wrong name | parameter error | interval covers size | of "
+      "| hidden | right name alone | truth in what is reported | wrong name | parameter error | interval covers size | "
+      "of "
       "form "
       "| gain / oracle | reported |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
   for (const auto& c : cells) {

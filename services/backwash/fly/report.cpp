@@ -66,9 +66,9 @@ Verb report_verb(Command& app) {
   auto options = std::make_shared<ReportOptions>();
   auto& command = app.add_subcommand("report", "Judges and draws a flight of the daemon from its raw log");
   command
-      .add_option(
-          "logs,--log", options->logs,
-          "raw log of backwashd, or parts of one in their order; of one file the later parts in its folder are read too")
+      .add_option("logs,--log", options->logs,
+                  "raw log of backwashd, or parts of one in their order; of one file the later parts in its folder are "
+                  "read too")
       .required();
   command.add_option("--truth", options->truth,
                      "log of the truth by backwash-bench, CSV; without it measured positions are judged");
