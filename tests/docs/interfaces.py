@@ -75,7 +75,7 @@ def declared(build: pathlib.Path) -> dict[str, str]:
 def printed(root: pathlib.Path, build: pathlib.Path) -> dict[str, str]:
     """Every block by its name."""
     tables = declared(build)
-    blocks = {name: listed_keys(table) for name, table in tables.items()}
+    blocks = {name: listed_keys(table) for name, table in tables.items() if name != "profiles"}
     blocks["profiles"] = "| profile | header.frame_id | child_frame_id | twist | rate_least, Hz |\n| --- | --- | --- | --- | --- |\n" + tables["profiles"]
 
     def about(path: str, verb: str, what: str) -> str:
@@ -107,9 +107,9 @@ def printed(root: pathlib.Path, build: pathlib.Path) -> dict[str, str]:
         verbs += f"- `{verb}`{' `--wait`' if told.pop('return when it is done', '') else ''}: {what}\n"
         of_verbs += listed({m: cell.replace("`", f"`{verb} ", 1) for m, cell in told.items()})
     blocks["backwashctl"] = f"{listed(options(help_of(path)))}\nVerbs; `--wait` returns when it is done:\n\n{verbs}\nOptions of one verb:\n\n{of_verbs}"
-    declared = topics_of(root)
+    all_topics = topics_of(root)
     more = {"vehicle": ["rt/diagnostics", "rt/tf"]}  # of all robots of a domain
-    blocks["roles"] = "".join(f"- `{role}` may write " + (", ".join([n for n, _, _, may in declared if role in may] + more.get(role, [])) or "nothing") + "\n"
+    blocks["roles"] = "".join(f"- `{role}` may write " + (", ".join([n for n, _, _, may in all_topics if role in may] + more.get(role, [])) or "nothing") + "\n"
                               for role in ("vehicle", "station", "vio", "observer"))
     blocks["DDS"] = topics(root)
     return blocks
