@@ -42,12 +42,13 @@ def options(help_text: str) -> dict[str, str]:
 
 
 def listed_keys(table: str) -> str:
-    """Rows of a table of keys as a list: key (unit, range, default): meaning. *How to measure it.* What is the same along z stands with its key."""
+    """Rows of a table of keys as a list: key (unit, range, default): meaning. *How to measure it.* What differs by its axis alone stands with its key."""
     lines: list[str] = []
     for key, unit, span, default, meaning, how in rows(table):
         brackets = ", ".join(filter(None, (unit, span, default)))
-        if meaning == "along z" and lines and f"({brackets}):" in lines[-1] and (how == "the same" or f"*{how}*" in lines[-1]):
-            lines[-1] = lines[-1].replace(" (", f", along z {key} (", 1)
+        if (lines and len(meaning.split()) <= 3 and f"({brackets}):" in lines[-1] and lines[-1].startswith(f"- {key.split('.')[0]}.")
+                and (how in ("", "the same") or f"*{how}*" in lines[-1])):
+            lines[-1] = lines[-1].replace(" (", f", {meaning} {key} (", 1)
             continue
         lines.append(f"- {key}" + (f" ({brackets})" if brackets else "") + f": {meaning}" + (f". *{how}*" if how else ""))
     return "\n".join(lines).replace("\\|", "|") + "\n"
