@@ -45,7 +45,7 @@ std::vector<Key> daemon_keys(Daemon& d, Said& said) {
       {"reach.risk", &d.risk, {1e-6, 0.5}, optional, "", "of a touch, at most, in each way from the vehicle on and each minute at rest. No extended model, no integrator", "0.001", "with `risk`"},
       {"adaptation.enabled", &d.adaptation.enabled, {}, optional, "", "sets grow in flight where errors are shown to be larger than promised (docs/model.md, section 7). No extended model", "true where fans, windows or other propellers are"},
       {"adaptation.alpha", &d.adaptation.alpha, {1e-6, 0.1}, optional, "", "probability of a flight in which that is said wrongly, under 7-4"},
-      {"adaptation.calmest", &d.adaptation.calmest, {0.1, 1}, optional, "", "sets shrink at rest down to this factor on Σ, class by class, after a minute of calmer air (7-12); 1: none. 1 with `map.window`, whose floor is assumed", "the lower end of the level that calibration told"},
+      {"adaptation.calmest", &d.adaptation.calmest, {0.1, 1}, optional, "", "sets shrink at rest down to this factor on Σ, class by class, after a minute of calmer air (7-12); 1: none. 1 with `map.window`, whose floor is assumed", "the lower end of the level that calibration reported"},
       {"adaptation.file", &d.adaptation.file, {}, optional, "", "keeps factors of rough air over restarts, for this vehicle and model file: another's is refused (78), a damaged one moved to FILE.damaged", "/var/lib/backwash/air.factors"},
       {"log.file", &d.log.file, {}, required, "", "raw log; a later start makes NAME-2, NAME-3 …"},
       {"log.max_mib", &d.log.max_mib, {1, 4096}, optional, "MiB", "a larger file is followed by the next number, once the mode is passive"},

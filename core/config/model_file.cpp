@@ -40,7 +40,7 @@ std::vector<Key> model_keys(Model& m) {
       {"ground.k2", &m.ground.k2, kDecay, required, "1/m²", "k_g2"},
       {"corner.phi_max", &m.corner.phi_max, kAngle, required, "rad", "gate φ̄_c"},
       {"corner.l_max", &m.corner.l_max, kLength, required, "m", "gate l̄_c"},
-      {"corner.lambda.normal", &m.corner.lambda.normal, kVariance, required, "(m/s²)²", "λ_c across the wall", "low hovers beside the foot of a wall"},
+      {"corner.lambda.normal", &m.corner.lambda.normal, kVariance, required, "(m/s²)²", "λ_c across the wall", "low hovers next to the foot of a wall"},
       {"corner.lambda.tangential", &m.corner.lambda.tangential, kVariance, required, "(m/s²)²", "along it"},
       {"corner.lambda.vertical", &m.corner.lambda.vertical, kVariance, required, "(m/s²)²", "vertical"},
       {"wall.theta_min", &m.wall.theta_min, kAngle, required, "rad", "gate θ_w"},

@@ -40,7 +40,7 @@ std::vector<Key> vehicle_keys(Vehicle& v, Px4Gains& px4) {
       {"controller.px4.MPC_Z_VEL_P_ACC", &px4.z_vel_p_acc, kPx4Gain, optional, "1/s", "along z"},
       {"controller.px4.MPC_XY_VEL_I_ACC", &px4.xy_vel_i_acc, kKi, optional, "1/s²", "as velocity_integrator; not PX4's own default"},
       {"controller.px4.MPC_Z_VEL_I_ACC", &px4.z_vel_i_acc, kKi, optional, "1/s²", "along z"},
-      {"controller.velocity_integrator.horizontal", &v.controller.velocity_integrator.horizontal, kKi, with_parent, "1/s²", "integral gain of the velocity loop, beside kp and kd; both axes above 0, or neither", "MPC_XY_VEL_I_ACC, PSC_VELXY_I", "0"},
+      {"controller.velocity_integrator.horizontal", &v.controller.velocity_integrator.horizontal, kKi, with_parent, "1/s²", "integral gain of the velocity loop, with kp and kd; both axes above 0, or neither", "MPC_XY_VEL_I_ACC, PSC_VELXY_I", "0"},
       {"controller.velocity_integrator.vertical", &v.controller.velocity_integrator.vertical, kKi, with_parent, "1/s²", "along z", "MPC_Z_VEL_I_ACC; where another integrator holds height (PSC_ACCZ_I), k_d over the time in which a shift decays", "0"},
       {"controller.latency", &v.controller.latency, kDelay, optional, "s", "set-point to controller", "from a set-point's stamp to its echo in the autopilot's log; half of TIMESYNC's round trip at least"},
       {"controller.feedback_delay", &v.controller.feedback_delay, kDelay, optional, "s", "measurement to action", "estimator's delay in its log"},

@@ -50,7 +50,8 @@ def main() -> int:
     listed = [reason for row in rows(part["In flight: what to do"])[1:] for reason in row[0].split("; ")]
     expect("reasons", set(listed), reasons)
     wrong.extend(f"reason '{r}' stands twice" for r in set(listed) if listed.count(r) > 1)
-    keys = {k for row in rows(sections((root / "docs/interfaces.md").read_text())["Vehicle file"])[1:] for k in quoted(row[0])}
+    keys = {k for line in sections((root / "docs/interfaces.md").read_text())["Vehicle file"].splitlines() if line.startswith("- `")
+            for k in quoted(line.partition(" (")[0])}
     named = {k for row in rows(part["Your vehicle"])[1:] for k in quoted(row[0])}
     for key in sorted(keys - {"name"}):  # .horizontal and .vertical are one subject, and the autopilot's own gains are those of kp and kd
         stem = re.sub(r"\.(horizontal|vertical)$", "", key)

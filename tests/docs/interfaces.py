@@ -41,6 +41,19 @@ def options(help_text: str) -> dict[str, str]:
     return told
 
 
+def listed_keys(table: str) -> str:
+    """Rows of a table of keys as a list: key (unit, range, default): meaning. *How to measure it.* What differs by its axis alone stands with its key."""
+    lines: list[str] = []
+    for key, unit, span, default, meaning, how in rows(table):
+        brackets = ", ".join(filter(None, (unit, span, default)))
+        if (lines and len(meaning.split()) <= 3 and f"({brackets}):" in lines[-1] and lines[-1].startswith(f"- {key.split('.')[0]}.")
+                and (how in ("", "the same") or f"*{how}*" in lines[-1])):
+            lines[-1] = lines[-1].replace(" (", f", {meaning} {key} (", 1)
+            continue
+        lines.append(f"- {key}" + (f" ({brackets})" if brackets else "") + f": {meaning}" + (f". *{how}*" if how else ""))
+    return "\n".join(lines).replace("\\|", "|") + "\n"
+
+
 def listed(told: dict[str, str]) -> str:
     return "".join(f"- {cell}: {meaning}\n" if meaning else f"- {cell}\n" for meaning, cell in told.items())
 
@@ -53,13 +66,18 @@ def verbs_of(text: str) -> list[tuple[str, str]]:
     return re.findall(r"^  (\w+) {2,}(.*)", text.split("Subcommands:")[1], re.M) if "Subcommands:" in text else []
 
 
+def declared(build: pathlib.Path) -> dict[str, str]:
+    """Rows of the tables that core declares, by name."""
+    run = subprocess.run([build / "tests/tables"], capture_output=True, text=True, check=True).stdout
+    parts = re.split(r"^== (.*)\n", re.sub(r"docs/(\w+\.md)", r"[\1](\1)", run), flags=re.M)[1:]
+    return dict(zip(parts[::2], parts[1::2]))
+
+
 def printed(root: pathlib.Path, build: pathlib.Path) -> dict[str, str]:
     """Every block by its name."""
-    run = subprocess.run([build / "tests/tables"], capture_output=True, text=True, check=True).stdout
-    head = "| key | unit | range | default | meaning | how to measure or choose it |\n| --- | --- | --- | --- | --- | --- |\n"
-    parts = re.split(r"^== (.*)\n", re.sub(r"docs/(\w+\.md)", r"[\1](\1)", run), flags=re.M)[1:]
-    blocks = {name: head + table for name, table in zip(parts[::2], parts[1::2])}
-    blocks["profiles"] = "| profile | header.frame_id | child_frame_id | twist | rate_least, Hz |\n| --- | --- | --- | --- | --- |\n" + parts[-1]
+    tables = declared(build)
+    blocks = {name: listed_keys(table) for name, table in tables.items() if name != "profiles"}
+    blocks["profiles"] = "| profile | header.frame_id | child_frame_id | twist | rate_least, Hz |\n| --- | --- | --- | --- | --- |\n" + tables["profiles"]
 
     def about(path: str, verb: str, what: str) -> str:
         text = help_of(path, *verb.split())
@@ -71,19 +89,28 @@ def printed(root: pathlib.Path, build: pathlib.Path) -> dict[str, str]:
             out += f"\n`{pathlib.Path(path).name} {verb} {v}`{takes}: {w}.\n\n{listed(dict(i for i in told.items() if i not in shared))}"
         return re.sub(r"\n{3,}", "\n\n", out).rstrip("\n") + "\n"
 
+    seen: dict[str, str] = {}  # a meaning of many words → the verb behind which it stands
+
+    def once(verb: str, block: str) -> str:
+        def entry(line: re.Match) -> str:
+            if len(line[2].split()) < 6 or seen.setdefault(line[2], verb) == verb:
+                return line[0]
+            return f"{line[1]}: as of `{seen[line[2]]}`"
+        return re.sub(r"^(- `[^:]*(?:\(.*?\))?): (.*)$", entry, block, flags=re.M)
+
     for program in ("backwash", "backwashd", "backwash-bench"):
         path = str(build / "services" / program)
         text = help_of(path)
-        blocks |= {f"{program} {verb}": about(path, verb, what) for verb, what in verbs_of(text)} or {program: listed(options(text))}
+        blocks |= {f"{program} {verb}": once(verb, about(path, verb, what)) for verb, what in verbs_of(text)} or {program: listed(options(text))}
     path, verbs, of_verbs = str(build / "services/backwashctl"), "", ""
     for verb, what in verbs_of(help_of(path)):
         told = options(help_of(path, verb))
         verbs += f"- `{verb}`{' `--wait`' if told.pop('return when it is done', '') else ''}: {what}\n"
         of_verbs += listed({m: cell.replace("`", f"`{verb} ", 1) for m, cell in told.items()})
     blocks["backwashctl"] = f"{listed(options(help_of(path)))}\nVerbs; `--wait` returns when it is done:\n\n{verbs}\nOptions of one verb:\n\n{of_verbs}"
-    declared = topics_of(root)
+    all_topics = topics_of(root)
     more = {"vehicle": ["rt/diagnostics", "rt/tf"]}  # of all robots of a domain
-    blocks["roles"] = "".join(f"- `{role}` may write " + (", ".join([n for n, _, _, may in declared if role in may] + more.get(role, [])) or "nothing") + "\n"
+    blocks["roles"] = "".join(f"- `{role}` may write " + (", ".join([n for n, _, _, may in all_topics if role in may] + more.get(role, [])) or "nothing") + "\n"
                               for role in ("vehicle", "station", "vio", "observer"))
     blocks["DDS"] = topics(root)
     return blocks
@@ -230,7 +257,7 @@ def check_mavlink(root: pathlib.Path, sections_of: dict[str, str]) -> None:
 
 def example(text: str, table: str) -> str:
     """The example with what the table says behind each key; keys that it lacks stand at their table's end as comments."""
-    keys = {quoted(c[0])[0]: c for c in rows(table)[1:]}
+    keys = {quoted(c[0])[0]: c for c in rows(table)}
     out: list[str] = []
     seen, section = set(), ""
 
@@ -265,7 +292,7 @@ def main() -> int:
     blocks = printed(root, build)
     shipped = root / "core/config/files/backwashd.daemon.toml"
     expect("printed block", {m[1] for m in BLOCK.findall(text)}, set(blocks))
-    for file, whole in ((page, BLOCK.sub(lambda m: m[1] + blocks.get(m[2], m[3]) + m[4], text)), (shipped, example(shipped.read_text(), blocks["Daemon file"]))):
+    for file, whole in ((page, BLOCK.sub(lambda m: m[1] + blocks.get(m[2], m[3]) + m[4], text)), (shipped, example(shipped.read_text(), declared(build)["Daemon file"]))):
         if "--update" in sys.argv:
             file.write_text(whole)
         elif whole != file.read_text():

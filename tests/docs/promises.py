@@ -12,7 +12,7 @@ COUNT = r"(\d+)/(\d+) [^|]*"
 
 
 def rows(text: str) -> dict[str, list[tuple[int, int]]]:
-    """Hidden → right name alone, truth in what is told, wrong name, interval covers size, as (so many, of so many)."""
+    """Hidden → right name alone, truth in what is reported, wrong name, interval covers size, as (so many, of so many)."""
     found = re.findall(rf"^\| ([\w ,]+) \| {COUNT}\| {COUNT}\| {COUNT}\| [^|]*\| (?:{COUNT}|–[^|]*)\|", text, re.M)
     return {row[0]: [(int(n or 0), int(of or 0)) for n, of in zip(row[1::2], row[2::2])] for row in found}
 

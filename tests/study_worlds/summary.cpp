@@ -151,7 +151,7 @@ std::vector<Requirement> gates(const std::vector<CellSummary>& cells) {
           "power ≥ 0.8, the right name in the set", cells, plain, [](auto& c) { return text(c.in_sets); },
           [](auto& c) { return c.in_sets.hits >= 0.8 * c.in_sets.n; }),
       over(
-          "unknown structure that explains ≥ 0.15 told ≥ 0.8", cells, is("unknown"),
+          "unknown structure that explains ≥ 0.15 reported ≥ 0.8", cells, is("unknown"),
           [](auto& c) { return text(c.right); }, [](auto& c) { return c.right.hits >= 0.8 * c.right.n; }),
       over(
           "confounded: truth in the set ≥ 0.9", cells, confounded, [](auto& c) { return text(c.in_sets); },
@@ -170,9 +170,10 @@ std::vector<Requirement> gates(const std::vector<CellSummary>& cells) {
 
 std::string markdown(const std::vector<CellSummary>& cells, const std::vector<WorldOutcome>& outcomes) {
   std::string page =
-      "| hidden | right name alone | truth in what is told | wrong name | parameter error | interval covers size | of "
+      "| hidden | right name alone | truth in what is reported | wrong name | parameter error | interval covers size | "
+      "of "
       "form "
-      "| gain / oracle | told |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+      "| gain / oracle | reported |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
   for (const auto& c : cells) {
     page += "| " + c.cell + " | " + text(c.right) + " | " + text(c.in_sets) + " | " + text(c.wrong_name) + " | " +
             (c.errors.empty() ? "–" : text("%.2f", median(c.errors))) + " | " + text(c.covered) + " | " +

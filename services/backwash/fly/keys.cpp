@@ -80,7 +80,7 @@ void check_name(const std::string& name) {
 security::Authority authority_of(const KeysOptions& o) {
   const std::string key = path(o, kAuthority, security::kKey);
   auto authority = security::Authority::of({read(key), read(path(o, kAuthority, security::kCertificate))});
-  if (!authority) throw Failure(kBadData, key + ":1: is not the key of cert.pem beside it; restore both");
+  if (!authority) throw Failure(kBadData, key + ":1: is not the key of cert.pem next to it; restore both");
   return *authority;
 }
 

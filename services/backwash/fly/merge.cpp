@@ -39,7 +39,7 @@ double of_this_flight(const std::string& ours, const std::string& theirs, std::o
   if (*distance < kFar) return *distance;
   char far[32];
   std::snprintf(far, sizeof far, "%.1f", *distance);
-  throw Failure(kBadData, theirs + ":1: its poses are " + far + " m (median) from those that the autopilot told in " +
+  throw Failure(kBadData, theirs + ":1: its poses are " + far + " m (median) from those that the autopilot sent in " +
                               ours + " at the same times: give the log of this flight");
 }
 
@@ -79,7 +79,7 @@ int run(const MergeOptions& options) {
         "clocks               %zu exchanges, %.1f ppm apart, residual %.3f ms rms, %.3f ms at most (round trip %.1f "
         "ms)\n"
         "the autopilot's      %" PRIu64 " poses, %" PRIu64
-        " outside the time of our log, %.3f m from what it told us "
+        " outside the time of our log, %.3f m from what it sent us "
         "(median)\n",
         clock.pairs, 1e6 * clock.rate, 1e3 * clock.rms_s, 1e3 * clock.largest_s, 1e3 * clock.round_trip_s, merged,
         poses->size() - merged, distance);

@@ -66,16 +66,16 @@ Verb report_verb(Command& app) {
   auto options = std::make_shared<ReportOptions>();
   auto& command = app.add_subcommand("report", "Judges and draws a flight of the daemon from its raw log");
   command
-      .add_option(
-          "logs,--log", options->logs,
-          "raw log of backwashd, or parts of one in their order; of one file the later parts beside it are read too")
+      .add_option("logs,--log", options->logs,
+                  "raw log of backwashd, or parts of one in their order; of one file the later parts in its folder are "
+                  "read too")
       .required();
   command.add_option("--truth", options->truth,
                      "log of the truth by backwash-bench, CSV; without it measured positions are judged");
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME").capture_default_str();
   command.add_option("--model", options->model, "model file or builtin:NAME; a built-in vehicle has its own");
   add_risk(command, options->risk);
-  command.add_option("--because", options->because, "what ended the flight, as you know it: told first");
+  command.add_option("--because", options->because, "what ended the flight, as you know it: stands first");
   command.add_option("--out", options->out, "HTML page to write");
   command.add_flag("--json", options->json, "one JSON object on stdout");
   command.add_flag("--force", options->force, "overwrite --out");
