@@ -98,18 +98,22 @@ LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, bool closed
 }
 
 std::vector<std::vector<Vec3>> answers(const Flown& log, const loop::PositionLoop& loop, std::span<const double> lags) {
+  Place place(log, HUGE_VAL);
+  const auto asked = [&](double now) {
+    const Setpoint command = place.at(now - loop.latency).command();
+    return loop.asked(command, place.at(now - loop.feedback_delay).state());
+  };
   std::vector<loop::PositionLoop> loops(lags.size(), loop);
   for (std::size_t n = 0; n < lags.size(); ++n)
     loops[n].attitude_lag = std::max<double>(kWindowRules.least_lag, lags[n]);
   std::vector<std::vector<Vec3>> out(lags.size());
-  std::vector<Vec3> r(lags.size(), Vec3::Zero());
-  Place place(log, HUGE_VAL);
+  std::vector<Vec3> r(lags.size());
   for (std::size_t i = 0; i < log.t.size(); ++i) {
     const double dt = i > 0 ? log.t[i] - log.t[i - 1] : 0, h = dt / pieces(dt);
-    for (int k = 0; k < pieces(dt); ++k) {
-      const double now = log.t[i] - dt + (k + 0.5) * h;
-      const Setpoint command = place.at(now - loop.latency).command();
-      const Vec3 u = loop.asked(command, place.at(now - loop.feedback_delay).state());
+    const bool begins = i == 0 || dt > kWindowRules.restart;
+    if (begins) std::ranges::fill(r, asked(log.t[i]));
+    for (int k = 0; k < pieces(dt) && !begins; ++k) {
+      const Vec3 u = asked(log.t[i] - dt + (k + 0.5) * h);
       for (std::size_t n = 0; n < lags.size(); ++n) r[n] = loops[n].after(r[n], u, h);
     }
     for (std::size_t n = 0; n < lags.size(); ++n) out[n].push_back(r[n]);

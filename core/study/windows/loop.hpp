@@ -39,7 +39,8 @@ struct LoopMotion {
 LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, bool closed, double drag = 0);
 
 /// What the loop answers to the logged state at each row, by each attitude lag (s): r of docs/model.md 3-1, m/s². The
-/// middle of each piece of kWindowRules.loop_step at most is held.
+/// middle of each piece of kWindowRules.loop_step at most is held; at the first row, and after kWindowRules.restart,
+/// r = u.
 std::vector<std::vector<Vec3>> answers(const Flown& log, const loop::PositionLoop& loop, std::span<const double> lags);
 
 }  // namespace backwash::study
