@@ -72,21 +72,18 @@ loop::PositionLoop with_command_age(loop::PositionLoop loop, std::span<const dou
   return loop;
 }
 
-LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, bool closed, double drag) {
+LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, double drag) {
   LoopMotion out;
   Place place(log);
   State now{log.commands.front().p_W, Vec3::Zero()};
   Vec3 a = Vec3::Zero();
-  std::size_t felt = 0;
   for (std::size_t i = 0; i < log.t.size(); ++i) {
     const double dt = i > 0 ? log.t[i] - log.t[i - 1] : 0;
     const bool gap = dt > kWindowRules.restart;
     if (gap) now = {log.p[i], log.v[i]};
     for (int k = 0; k < pieces(dt); ++k) {
       const double h = gap ? 0 : dt / pieces(dt), t = log.t[i] - dt + (k + 1) * h;
-      while (felt + 1 < log.t.size() && log.t[felt + 1] <= t - loop.feedback_delay + kWindowRules.stamp_error) ++felt;
-      const State at = closed ? now : State{log.p[felt], log.v[felt]};
-      a = loop.after(a, loop.asked(place.at(t - loop.latency).command(), at), h);
+      a = loop.after(a, loop.asked(place.at(t - loop.latency).command(), now), h);
       now.v_W += h * (a - drag * Vec3(now.v_W.x(), now.v_W.y(), 0));
       now.p_W += h * now.v_W;
     }
