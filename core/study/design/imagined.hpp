@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "core/study/windows/observation.hpp"
-#include "core/types/vehicle.hpp"
 #include "core/types/state.hpp"
+#include "core/types/vehicle.hpp"
 
 namespace backwash::study {
 
