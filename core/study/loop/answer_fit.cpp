@@ -53,7 +53,7 @@ std::vector<Vec3> answer_of(const AnswerLog& log, const Vehicle& vehicle, double
 
 std::vector<Vec3> positions_of(const AnswerLog& log, const Vehicle& vehicle) {
   const Series& s = log.series;
-  return loop_of({s.t, s.p, s.v, log.commands}, with_command_age(loop::PositionLoop(vehicle), s.t), true).p;
+  return loop_of({s.t, s.p, s.v, log.commands}, with_command_age(loop::PositionLoop(vehicle), s.t)).p;
 }
 
 /// slow(…, detrended(x), width) of a window as a matrix: it is asked for thousands of times.

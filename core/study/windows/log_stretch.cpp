@@ -2,9 +2,10 @@
 #include "core/study/windows/log_stretch.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
-#include "core/loop/position_loop.hpp"
+#include "core/study/windows/loop.hpp"
 
 namespace backwash::study {
 namespace {
@@ -48,14 +49,6 @@ class Resampler {
   std::vector<At> at_;
 };
 
-/// Value `delay` seconds before row k; the first row's before the stretch begins.
-Vec3 before(const std::vector<Vec3>& x, std::size_t k, double delay_s, double rate) {
-  const double at = std::max(0.0, static_cast<double>(k) - delay_s * rate);
-  const auto low = std::min(static_cast<std::size_t>(at), x.size() - 1), high = std::min(low + 1, x.size() - 1);
-  const double share = at - static_cast<double>(low);
-  return (1 - share) * x[low] + share * x[high];
-}
-
 std::vector<Vec3> differentiated(const std::vector<Vec3>& x, double rate) {
   std::vector<Vec3> rates;
   for (std::size_t k = 0; k < x.size(); ++k) {
@@ -65,25 +58,22 @@ std::vector<Vec3> differentiated(const std::vector<Vec3>& x, double rate) {
   return rates;
 }
 
-/// a minus what the rotors produce on the commands, by the vehicle's loop.
+/// a minus what the vehicle's loop answers to the motion and the set-points.
 std::vector<Vec3> beyond_command(const Even& e, const Resampler& rows, const log::FlightLog& log,
                                  const Vehicle& vehicle) {
-  const loop::PositionLoop loop(vehicle);
-  const auto cmd_p = rows.xyz("cmd_", "_m");
-  const auto cmd_v = has_xyz(log, "cmd_v", "_mps") ? rows.xyz("cmd_v", "_mps") : differentiated(cmd_p, e.rate);
-  const auto cmd_a =
+  const auto p = rows.xyz("cmd_", "_m");
+  const auto v = has_xyz(log, "cmd_v", "_mps") ? rows.xyz("cmd_v", "_mps") : differentiated(p, e.rate);
+  const auto a =
       has_xyz(log, "cmd_a", "_mps2") ? rows.xyz("cmd_a", "_mps2") : std::vector<Vec3>(e.size(), Vec3::Zero());
-  std::vector<Vec3> w;
-  Vec3 rotors = Vec3::Zero(), last = Vec3::Zero();
+  std::vector<double> t;
+  std::vector<Setpoint> commands;
   for (std::size_t k = 0; k < e.size(); ++k) {
-    const auto sent = [&](const std::vector<Vec3>& x) { return before(x, k, loop.latency, e.rate); };
-    const auto felt = [&](const std::vector<Vec3>& x) { return before(x, k, loop.feedback_delay, e.rate); };
-    const Vec3 u = loop.asked({sent(cmd_p), sent(cmd_v), sent(cmd_a)}, {felt(e.p), felt(e.v)});
-    const Vec3 driven = loop.attitude_lag > 0 ? Vec3(0.5 * (last + u)) : u;
-    rotors = k == 0 ? u : loop.after(rotors, driven, 1 / e.rate);
-    last = u;
-    w.push_back(e.a[k] - rotors);
+    t.push_back(static_cast<double>(k) / e.rate);
+    commands.push_back({p[k], v[k], a[k]});
   }
+  const auto loop = with_command_age(loop::PositionLoop(vehicle), t);
+  auto w = answers({t, e.p, e.v, commands}, loop, std::array{loop.attitude_lag}).front();
+  for (std::size_t k = 0; k < e.size(); ++k) w[k] = e.a[k] - w[k];
   return w;
 }
 

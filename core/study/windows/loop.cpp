@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
+#include <utility>
 
 #include "core/log/columns/log_columns.hpp"
 #include "core/study/windows/gates/window_rules.hpp"
@@ -72,21 +74,25 @@ loop::PositionLoop with_command_age(loop::PositionLoop loop, std::span<const dou
   return loop;
 }
 
-LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, bool closed, double drag) {
+LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, double drag) {
   LoopMotion out;
   Place place(log);
   State now{log.commands.front().p_W, Vec3::Zero()};
   Vec3 a = Vec3::Zero();
-  std::size_t felt = 0;
+  std::deque<std::pair<double, State>> past;  // from the state on that the controller feels
   for (std::size_t i = 0; i < log.t.size(); ++i) {
     const double dt = i > 0 ? log.t[i] - log.t[i - 1] : 0;
     const bool gap = dt > kWindowRules.restart;
-    if (gap) now = {log.p[i], log.v[i]};
+    if (gap) {
+      now = {log.p[i], log.v[i]};
+      past.clear();
+    }
     for (int k = 0; k < pieces(dt); ++k) {
       const double h = gap ? 0 : dt / pieces(dt), t = log.t[i] - dt + (k + 1) * h;
-      while (felt + 1 < log.t.size() && log.t[felt + 1] <= t - loop.feedback_delay + kWindowRules.stamp_error) ++felt;
-      const State at = closed ? now : State{log.p[felt], log.v[felt]};
-      a = loop.after(a, loop.asked(place.at(t - loop.latency).command(), at), h);
+      past.emplace_back(t - h, now);
+      while (past.size() > 1 && past[1].first <= t - h - loop.feedback_delay + kWindowRules.stamp_error)
+        past.pop_front();
+      a = loop.after(a, loop.asked(place.at(t - loop.latency).command(), past.front().second), h);
       now.v_W += h * (a - drag * Vec3(now.v_W.x(), now.v_W.y(), 0));
       now.p_W += h * now.v_W;
     }
@@ -98,18 +104,22 @@ LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, bool closed
 }
 
 std::vector<std::vector<Vec3>> answers(const Flown& log, const loop::PositionLoop& loop, std::span<const double> lags) {
+  Place place(log, HUGE_VAL);
+  const auto asked = [&](double now) {
+    const Setpoint command = place.at(now - loop.latency).command();
+    return loop.asked(command, place.at(now - loop.feedback_delay).state());
+  };
   std::vector<loop::PositionLoop> loops(lags.size(), loop);
   for (std::size_t n = 0; n < lags.size(); ++n)
     loops[n].attitude_lag = std::max<double>(kWindowRules.least_lag, lags[n]);
   std::vector<std::vector<Vec3>> out(lags.size());
-  std::vector<Vec3> r(lags.size(), Vec3::Zero());
-  Place place(log, HUGE_VAL);
+  std::vector<Vec3> r(lags.size());
   for (std::size_t i = 0; i < log.t.size(); ++i) {
     const double dt = i > 0 ? log.t[i] - log.t[i - 1] : 0, h = dt / pieces(dt);
-    for (int k = 0; k < pieces(dt); ++k) {
-      const double now = log.t[i] - dt + (k + 0.5) * h;
-      const Setpoint command = place.at(now - loop.latency).command();
-      const Vec3 u = loop.asked(command, place.at(now - loop.feedback_delay).state());
+    const bool begins = i == 0 || dt > kWindowRules.restart;
+    if (begins) std::ranges::fill(r, asked(log.t[i]));
+    for (int k = 0; k < pieces(dt) && !begins; ++k) {
+      const Vec3 u = asked(log.t[i] - dt + (k + 0.5) * h);
       for (std::size_t n = 0; n < lags.size(); ++n) r[n] = loops[n].after(r[n], u, h);
     }
     for (std::size_t n = 0; n < lags.size(); ++n) out[n].push_back(r[n]);

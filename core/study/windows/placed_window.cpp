@@ -92,7 +92,8 @@ WindowRow placed(const log::FlightLog& log, const Series& s, SampleRange w, cons
   // would explain them. Where the set-points lead is known without them, unless the craft flies elsewhere.
   const bool as_told = !s.p_nominal.empty() && (mean_of(s.p_nominal) - mean_of(s.p)).norm() < kWindowRules.stray;
   const auto &p = as_told ? s.p_nominal : s.p, &v = as_told ? s.v_nominal : s.v;
-  row.p_W = mean_of(p), row.v_W = mean_of(v);
+  row.p_W = mean_of(p);
+  row.v_W = mean_of(v);
   row.held_off = vehicle.controller.velocity_integrator.horizontal > 0;
   const auto varied2 = [&](const std::vector<Vec3>& x) {
     Vec3 square = Vec3::Zero();

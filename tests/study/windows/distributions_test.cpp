@@ -94,7 +94,7 @@ TEST(Observed, DamagedBytesAreRefusedOrAreAFlightThatIsSound) {
     if (!flight) continue;
     ASSERT_EQ(flight->seen.first.back(), flight->seen.windows.size());
     for (const auto& row : flight->seen.windows) ASSERT_LT(row.flight, flight->seen.flights);
-    for (const auto& w : flight->thrust) ASSERT_LT(w.window, flight->seen.windows.size());
+    for (const auto& w : flight->delays.thrust) ASSERT_LT(w.window, flight->seen.windows.size());
   }
 }
 

@@ -68,19 +68,19 @@ void read_attitude(Series& s, const log::FlightLog& log, const RowNumbers& rows)
 /// What the set-points lead to, unless the craft flew elsewhere.
 void read_commands(Series& s, std::span<const Setpoint> commands, const Vehicle& vehicle) {
   const Flown flown{s.t, s.p, s.v, commands};
-  const loop::PositionLoop told(vehicle), loop = with_command_age(told, s.t);
-  LoopMotion nominal = loop_of(flown, loop, true);
+  const auto loop = with_command_age(loop::PositionLoop(vehicle), s.t);
+  LoopMotion nominal = loop_of(flown, loop);
   s.strayed = !follows(s, commands, nominal, vehicle);
   if (s.strayed) return;
-  if (!s.simulated_by_thrust) s.a_sim = loop_of(flown, loop, false).a;
+  if (!s.simulated_by_thrust) s.a_sim = answers(flown, loop, std::array{loop.attitude_lag}).front();
   loop::PositionLoop lagging = loop;
   lagging.attitude_lag += kWindowRules.more_lag;
-  s.a_lagging = loop_of(flown, lagging, true).a;
-  s.v_dragged = loop_of(flown, loop, true, kWindowRules.loop_drag).v;
+  s.a_lagging = loop_of(flown, lagging).a;
+  s.v_dragged = loop_of(flown, loop, kWindowRules.loop_drag).v;
   if (s.simulated_by_thrust) {
     std::array<double, kShifts.size()> lags;
-    for (std::size_t n = 0; n < lags.size(); ++n) lags[n] = told.attitude_lag + kShifts[n];
-    auto found = answers(flown, told, lags);
+    for (std::size_t n = 0; n < lags.size(); ++n) lags[n] = loop.attitude_lag + kShifts[n];
+    auto found = answers(flown, loop, lags);
     std::ranges::move(found, s.answer.begin());
   }
   s.p_nominal = std::move(nominal.p);
