@@ -30,7 +30,7 @@ StudyResult studied(const Observations& seen, std::vector<Known> known, bool dep
   options.minimum_detectable = false;
   options.dependence = dependence;
   options.search.known = std::move(known);
-  return study(seen, options);
+  return backwash::study::study(seen, options);
 }
 
 TEST(ExtendedAgain, WhatMayBeTheErrorOfAKnownFormIsNoCause) {

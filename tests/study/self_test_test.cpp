@@ -14,8 +14,8 @@ namespace {
 using namespace backwash::study;
 
 TEST(SelfTest, HasEveryCauseOfTheCatalogueAndWhatIsNone) {
-  std::map<std::string, const SelfTestRow*> rows = {{"unknown", self_test().of(Hidden::structure)},
-                                                    {"none", self_test().of(Hidden::nothing)}};
+  std::map<std::string, const SelfTestRow*> rows = {{"unknown", self_test().of(backwash::study::Hidden::structure)},
+                                                    {"none", self_test().of(backwash::study::Hidden::nothing)}};
   for (const auto& effect : effects()) rows[effect.name] = self_test().of(effect.name);
   EXPECT_EQ(self_test().rows.size(), rows.size());
   for (const auto& [name, r] : rows) {
@@ -37,9 +37,9 @@ TEST(SelfTest, AgreesWithTheConfusionTable) {
   EXPECT_NE(table.find("--seed " + std::to_string(self_test().seed)), std::string::npos);
   for (const auto& r : self_test().rows) {
     const auto of = [&](int count) { return std::to_string(count) + "/" + std::to_string(r.worlds); };
-    const std::string hidden = r.hidden == Hidden::nothing     ? "none"
-                               : r.hidden == Hidden::structure ? "unknown"
-                                                               : r.cause;
+    const std::string hidden = r.hidden == backwash::study::Hidden::nothing     ? "none"
+                               : r.hidden == backwash::study::Hidden::structure ? "unknown"
+                                                                                : r.cause;
     const auto begin = table.find("\n| " + hidden + " | " + of(r.alone) + " (");
     ASSERT_NE(begin, std::string::npos) << hidden;
     const std::string line = table.substr(begin + 1, table.find('\n', begin + 1) - begin);

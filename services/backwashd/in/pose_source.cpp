@@ -37,7 +37,7 @@ dds::Odometry as_odometry(const dds::TransformStamped& message, const std::strin
   return m;
 }
 
-std::string_view text(const char* s) { return s ? s : ""; }
+std::string_view text_or_none(const char* s) { return s ? s : ""; }
 
 }  // namespace
 
@@ -47,7 +47,7 @@ OurTransforms::OurTransforms(const config::Daemon& config)
       child_(config.odometry.child.empty() ? config.frames.body : config.odometry.child) {}
 
 void OurTransforms::take(const dds::TransformStamped& m, const dds::Guid& writer, const PoseTakers& takers) {
-  const std::string_view frame = text(m.header.frame_id), child = text(m.child_frame_id);
+  const std::string_view frame = text_or_none(m.header.frame_id), child = text_or_none(m.child_frame_id);
   if (child == child_ && (frame == map_ || frame == odometry_)) {
     heard_ = true;
     return takers.odometry(as_odometry(m, child_), writer);

@@ -55,7 +55,7 @@ TEST(Localization, TakesOdometryOfTheMapAsItIs) {
 
 TEST(Localization, RefusesFramesThatItDoesNotKnowAndNamesThem) {
   auto l = localization();
-  const auto other = l.odometry(odometry(kOther, kZero), 0);
+  const auto other = l.odometry(odometry(kUnknownFrame, kZero), 0);
   ASSERT_FALSE(other);
   EXPECT_NE(other.error().find("'camera'"), std::string::npos);
   std::string hostile = "\x1b[2J\nbackwashd: all is well";
@@ -65,7 +65,7 @@ TEST(Localization, RefusesFramesThatItDoesNotKnowAndNamesThem) {
   EXPECT_LT(cut.error().size(), 400u);
   EXPECT_EQ(cut.error().find_first_of("\x1b\n"), std::string::npos) << cut.error();
   auto child = odometry(kMap, kZero);
-  child.child_frame_id = dds::c_string(kOther);
+  child.child_frame_id = dds::c_string(kUnknownFrame);
   EXPECT_FALSE(l.odometry(child, 0));
   child.child_frame_id = nullptr;
   EXPECT_FALSE(l.odometry(child, 0));

@@ -6,6 +6,6 @@
 /// Names of frames, as messages hold them: the daemon's own by default, and one that it does not know.
 namespace backwash::daemon {
 
-inline const std::string kMap = "map", kOdom = "odom", kBody = "base_link", kOther = "camera";
+inline const std::string kMap = "map", kOdom = "odom", kBody = "base_link", kUnknownFrame = "camera";
 
 }  // namespace backwash::daemon

@@ -52,7 +52,7 @@ TEST(ScanPlacement, PlacesAScanOfTheBodyByThePoseAtItsStamp) {
   EXPECT_LT((scan->points_W[0] - Vec3(1 + std::cos(0.2), std::sin(0.2), 1)).norm(), 1e-6);
   EXPECT_EQ(scan->received_ns, 3);
   EXPECT_FALSE(l.scan(PointMessage(kBody, {1, 0, 0}, 1.3).m, 0)) << "too far from the newest odometry";
-  EXPECT_FALSE(l.scan(PointMessage(kOther, {1, 0, 0}, 1.05).m, 0));
+  EXPECT_FALSE(l.scan(PointMessage(kUnknownFrame, {1, 0, 0}, 1.05).m, 0));
   EXPECT_EQ(l.scan(PointMessage(kMap, {1, 0, 0}, 1.05).m, 0)->points_W[0], Vec3(1, 0, 0));
 }
 
