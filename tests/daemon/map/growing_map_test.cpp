@@ -34,7 +34,7 @@ class GrowingMap : public MapFaults, public testing::WithParamInterface<Change> 
   ~GrowingMap() override { std::filesystem::remove(log_); }
   void SetUp() override {
     map_moves_on_ = false;
-    lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
+    lookout_ = std::make_unique<Lookout>(*channels_, *channels_, kVehicle, settings_);
     send(known_);
     enable();
     fly();

@@ -49,7 +49,7 @@ class MapFaults : public testing::Test {
   std::int64_t seen_ns_ = 0;  // of the map that segments are verified in
 
   void SetUp() override {
-    lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
+    lookout_ = std::make_unique<Lookout>(*channels_, *channels_, kVehicle, settings_);
     map::OccupancyGrid grid = map::builtin_scene("parallel-walls-4m", 0.2).value();
     channels_->worlds.offer({plan::build_world(std::move(grid), Model{}, kVehicle)});
   }

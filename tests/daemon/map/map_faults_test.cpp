@@ -19,7 +19,7 @@ TEST_F(MapFaults, APoseOutsideTheMapIsHeld) {
 
 TEST_F(MapFaults, WithoutAMapEnablingIsRefused) {
   channels_ = std::make_unique<Channels>();
-  lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
+  lookout_ = std::make_unique<Lookout>(*channels_, *channels_, kVehicle, settings_);
   for (int n = 0; n < 40; ++n) tick();
   tick(track::Request::enable);
   EXPECT_EQ(out_.supervisor.mode, Mode::passive);
@@ -30,7 +30,7 @@ TEST_F(LateMapFault, ALateLiveMapIsHeldAfterASecondInMotionAndAStaticOneIsExempt
   for (const bool live : {false, true}) {
     settings_.live = live;
     settings_.closing_speed = 0.2;
-    lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
+    lookout_ = std::make_unique<Lookout>(*channels_, *channels_, kVehicle, settings_);
     if (!live) {
       enable();
       fly();
@@ -53,7 +53,7 @@ TEST_F(LateMapFault, ALateLiveMapIsHeldAfterASecondInMotionAndAStaticOneIsExempt
 TEST_F(LateMapFault, TheAgeShrinksTheTrustedClearance) {
   settings_.live = true;
   settings_.closing_speed = 0.2;
-  lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
+  lookout_ = std::make_unique<Lookout>(*channels_, *channels_, kVehicle, settings_);
   enable();
   fly(true, 0.1);  // 0.1 m of clearance: 0.5 s at 0.2 m/s
   for (int n = 0; n < 20; ++n) tick();
@@ -65,7 +65,7 @@ TEST_F(LateMapFault, TheAgeShrinksTheTrustedClearance) {
 TEST_F(LateMapFault, TheClearanceOfWhatIsBehindDoesNotCount) {
   settings_.live = true;
   settings_.closing_speed = 0.2;
-  lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
+  lookout_ = std::make_unique<Lookout>(*channels_, *channels_, kVehicle, settings_);
   enable();
   fly(true, 0.1);
   segment_->clearance_ahead = {0.1, 0.1, 0.5, 0.5};
@@ -76,7 +76,7 @@ TEST_F(LateMapFault, TheClearanceOfWhatIsBehindDoesNotCount) {
 
 TEST_F(LateMapFault, AtRestAnOldMapIsNoFault) {
   settings_.live = true;
-  lookout_ = std::make_unique<Lookout>(*channels_, kVehicle, settings_);
+  lookout_ = std::make_unique<Lookout>(*channels_, *channels_, kVehicle, settings_);
   enable();
   map_moves_on_ = false;
   EXPECT_EQ(ticks_until(Mode::hold, 100), 101);
