@@ -3,6 +3,7 @@
 
 #include <sstream>
 
+#include "core/report/page/interactive.hpp"
 #include "core/report/page/page.hpp"
 #include "core/types/formatted.hpp"
 
@@ -114,32 +115,29 @@ std::string demanded(const Comparison& c) {
 
 }  // namespace
 
-tl::expected<std::string, PlotError> comparison_report(const Comparison& c) {
+std::string comparison_report(const Comparison& c) {
+  PageData data;
   std::string body = "<h1>The same routes with other clearances</h1>\n<p class=\"context\">" +
                      formatted("%zu start–goal pairs a scene and vehicle, seed %llu; backwash ", c.flights,
                                static_cast<unsigned long long>(c.seed)) +
                      escaped(c.version) + "</p>\n" + demanded(c) + table_one(c);
-  if (c.table.common_pairs > 0) {
-    const auto figure = ratio_figure(c);
-    if (!figure) return tl::make_unexpected(figure.error());
+  if (c.table.common_pairs > 0)
     body += section(
         "The proposed method over the others",
         "Below 1 the proposed method needs less. Bars are paired 95 % intervals from 2,000 bootstrap samples of "
-        "the pairs; squares are the paper’s ratios. A slower plan has less jerk: jerk²·time⁵/length² takes that out.",
-        *figure + ratios(c));
-  }
-  for (const auto& gap : c.gaps) {
-    const auto figure = gap_figure(gap);
-    if (!figure) return tl::make_unexpected(figure.error());
+        "the pairs; the paper’s ratios are dots without one. A slower plan has less jerk: jerk²·time⁵/length² takes "
+        "that out.",
+        ratio_figure(c) + ratios(c));
+  for (const auto& gap : c.gaps)
     body += section(
         "Through the narrow gap: " + escaped(gap.vehicle),
         formatted("Measured position minus the predicted centre, first of %zu flights. Largest error over bound of "
                   "all of them: x %.2f, y %.2f, z %.2f; %zu of %zu samples outside; %zu flights with contact.",
                   gap.flights, gap.largest_ratio.x(), gap.largest_ratio.y(), gap.largest_ratio.z(), gap.outside,
                   gap.samples, gap.contacts),
-        *figure);
-  }
-  return html_page("backwash compare", body + by_scene(c));
+        gap_figure(gap, data));
+  const auto moved = interactive(data, javascript_folders());
+  return html_page("backwash compare", body + by_scene(c) + moved.notes, moved.scripts);
 }
 
 }  // namespace backwash::report

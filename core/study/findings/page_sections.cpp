@@ -2,7 +2,6 @@
 #include "core/study/findings/page_sections.hpp"
 
 #include <cstdio>
-#include <sstream>
 
 #include "core/report/page/page.hpp"
 #include "core/study/findings/study.hpp"
@@ -77,20 +76,29 @@ std::string rotor_sentence(const RotorVerdict& v) {
   }
 }
 
-tl::expected<std::string, report::PlotError> rotor_section(const RotorVerdict& v) {
-  std::ostringstream script;
-  script << "$each << EOD\n";
-  for (std::size_t r = 0; r < v.each.size(); ++r)
-    script << r + 1 << ' ' << 100 * v.each[r].d << ' ' << 100 * v.each[r].low << ' ' << 100 * v.each[r].high << '\n';
-  script << "EOD\nset xrange [0.5:4.5]\nset xtics ('rotor 1' 1, 'rotor 2' 2, 'rotor 3' 3, 'rotor 4' 4)\n"
-         << "set ylabel 'command needed more, %'\nset grid y\nset key outside top center horizontal\nset xzeroaxis lt "
-            "1 lc rgb '#888888'\n"
-         << "plot " << 100 * v.minimum << " with lines dt 2 lw 2 lc rgb '#c0561d' title 'named four times in five', "
-         << "$each using 1:2:3:4 with yerrorbars lw 2 pt 7 lc rgb '#1f6f9f' title 'if this rotor alone, 95 %'\n";
-  auto drawn = report::draw(script.str(), report::Format::svg, 860, 300);
-  if (!drawn) return drawn;
+std::string rotor_section(const RotorVerdict& v, report::PageData& data) {
+  using enum report::Kind;
+  using enum report::Shape;
+  report::DataTable table{"rotors", {"rotor", "percent", "percent_low", "percent_high"}, {}, 0};
+  report::Layer most{dots, after, "if this rotor alone, 95 %", {{}}}, bars{line, after, "", {}};
+  for (std::size_t r = 0; r < v.each.size(); ++r) {
+    const auto& e = v.each[r];
+    const auto at = static_cast<double>(r) + 1;
+    table.rows.push_back({at, 100 * e.d, 100 * e.low, 100 * e.high});
+    most.runs[0].push_back({at, 100 * e.d});
+    bars.runs.push_back({{at, 100 * e.low}, {at, 100 * e.high}});
+  }
+  data.tables.push_back(std::move(table));
+  const auto level = [](double y) { return report::Run{{0.5, y}, {4.5, y}}; };
+  const report::Chart chart{.x = {"", 0.5, 4.5, false, {"rotor 1", "rotor 2", "rotor 3", "rotor 4"}},
+                            .y = {"command needed more, %"},
+                            .layers = {{line, measured, "", {level(0)}},
+                                       {line, commanded, "named four times in five", {level(100 * v.minimum)}},
+                                       std::move(bars),
+                                       std::move(most)},
+                            .height = 300};
   return "<section><h2>Rotors against sound flights</h2>\n<p>" + report::escaped(rotor_sentence(v)) + "</p>\n" +
-         *drawn + "<table>\n" +
+         report::to_svg(chart) + report::files_html({"rotors"}) + "<table>\n" +
          row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
          row("Smallest that is named with 80 % power", percent(v.minimum)) +
          row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "core/report/page/plot.hpp"
+#include "core/report/page/page_data.hpp"
 #include "core/study/calibrate/height_effect.hpp"
 #include "core/study/inference/rotors/rotor_reference.hpp"
 #include "core/study/windows/observation.hpp"
@@ -24,7 +24,7 @@ std::string too_few(const Observations& seen);
 /// What the motor shares say against those of sound flights, in a sentence, and as a section of the page: what every
 /// rotor would need more, beside the smallest need that would be named. Error: the figure could not be drawn.
 std::string rotor_sentence(const RotorVerdict& verdict);
-tl::expected<std::string, report::PlotError> rotor_section(const RotorVerdict& verdict);
+std::string rotor_section(const RotorVerdict& verdict, report::PageData& data);
 
 /// Ratios of the vertical variance by height and plate, of all windows and of hovers alone; and, in a sentence, those
 /// of the hovers that differ from 1 (empty if none does).

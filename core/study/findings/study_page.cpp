@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <sstream>
 
+#include "core/report/page/interactive.hpp"
 #include "core/report/page/page.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/self_test.hpp"
@@ -81,16 +81,14 @@ Regressor flight_by_flight(const Observations& seen) {
           [longest](const WindowRow& w) { return static_cast<double>(w.flight) + 1 + w.t / longest[w.flight]; }};
 }
 
-/// Residual of the cause's first channel against its variable, before and after, with means of twelve groups.
-tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, const Observations& seen) {
+/// Residual of the cause's first channel against its variable, before and after, with means of twelve groups; `data`
+/// gets its table.
+std::string picture(const NamedCause& cause, const Observations& seen, report::PageData& data) {
   const auto& found = cause.found;
   const Channel channel = found.columns.front().parts.front().channel;
   const Regressor own = found.form->effect->axis;
   const Regressor along = cause.flights.empty() && varies(own, seen) ? own : flight_by_flight(seen);
-  struct Point {
-    double x, before, after;
-  };
-  std::vector<Point> points;
+  report::DataTable points{found.form->cause(), {along.name, "before", "after"}, {}, 0};
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     const double x = along.value(seen.windows[i]);
     if (!std::isfinite(x)) continue;
@@ -101,33 +99,32 @@ tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, co
           added[part.channel == kMeanY ? 1 : 0] += found.theta[static_cast<Eigen::Index>(k)] * part.x[i];
     const auto& w = seen.windows[i];
     const auto before = shown(*found.form->effect, w, seen, i, channel, {});
-    if (before) points.push_back({x, *before, *shown(*found.form->effect, w, seen, i, channel, added)});
+    if (before) points.rows.push_back({x, *before, *shown(*found.form->effect, w, seen, i, channel, added)});
   }
-  std::sort(points.begin(), points.end(), [](auto& a, auto& b) { return a.x < b.x; });
-  std::ostringstream script, dots, lines;
-  for (const auto& p : points) dots << p.x << ' ' << p.before << ' ' << p.after << '\n';
-  const std::size_t groups = std::min(static_cast<std::size_t>(kRules.picture_groups), points.size());
-  for (std::size_t g = 0; g < groups; ++g) {
-    const std::size_t a = g * points.size() / groups, b = (g + 1) * points.size() / groups;
-    Point mean{0, 0, 0};
-    for (std::size_t i = a; i < b; ++i) {
-      const double n = static_cast<double>(b - a);
-      mean.x += points[i].x / n;
-      mean.before += points[i].before / n;
-      mean.after += points[i].after / n;
+  std::ranges::sort(points.rows, {}, [](auto& row) { return row[0]; });
+  std::array<report::Run, 2> clouds, means;
+  const std::size_t all = points.rows.size(), groups = std::min(static_cast<std::size_t>(kRules.picture_groups), all);
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (const auto& row : points.rows) clouds[k].push_back({row[0], row[1 + k]});
+    for (std::size_t g = 0; g < groups; ++g) {
+      const std::size_t from = g * all / groups, until = (g + 1) * all / groups;
+      report::Place sum = report::Place::Zero();
+      for (std::size_t i = from; i < until; ++i) sum += clouds[k][i];
+      means[k].push_back(sum / static_cast<double>(until - from));
     }
-    lines << mean.x << ' ' << mean.before << ' ' << mean.after << '\n';
   }
-  script << "$dots << EOD\n"
-         << dots.str() << "EOD\n$lines << EOD\n"
-         << lines.str() << "EOD\nset xlabel '" << along.name << "'\nset ylabel 'missed: "
-         << (found.form->effect->towards_walls ? "mean towards that wall" : channel_name(channel))
-         << (channel <= kMeanZ ? ", m/s²" : "") << "'\nset key top right\nset grid\n"
-         << "plot $dots using 1:2 with points pt 7 ps 0.25 lc rgb '#c9b8a8' notitle, "
-         << "$dots using 1:3 with points pt 7 ps 0.25 lc rgb '#a8bccc' notitle, "
-         << "$lines using 1:2 with linespoints lw 3 pt 7 lc rgb '#c0561d' title 'before', "
-         << "$lines using 1:3 with linespoints lw 3 pt 7 lc rgb '#1f6f9f' title 'after'\n";
-  return report::draw(script.str(), report::Format::svg, 860, 380);
+  data.tables.push_back(std::move(points));
+  using enum report::Kind;
+  using enum report::Shape;
+  const std::string what = found.form->effect->towards_walls ? "mean towards that wall" : channel_name(channel);
+  return report::to_svg({.x = {along.name},
+                         .y = {"missed: " + what + (channel <= kMeanZ ? ", m/s²" : "")},
+                         .layers = {{dots, before, "", {clouds[0]}},
+                                    {dots, after, "", {clouds[1]}},
+                                    {line, before, "before", {means[0]}},
+                                    {line, after, "after", {means[1]}}},
+                         .height = 380}) +
+         report::files_html({found.form->cause()});
 }
 
 /// In which flights it acts, by number and by log.
@@ -253,8 +250,8 @@ std::string limits_sections(const StudyResult& result, const Observations& seen)
 
 }  // namespace
 
-tl::expected<std::string, report::PlotError> study_page(const StudyResult& result, const Observations& seen,
-                                                        const PageContext& context) {
+std::string study_page(const StudyResult& result, const Observations& seen, const PageContext& context) {
+  report::PageData data = context.data;
   std::string page = "<h1>What the simulation gets wrong</h1>\n", beside;
   if (context.height) beside = height_sentence(*context.height);
   if (!beside.empty()) beside.insert(0, " ");
@@ -268,17 +265,12 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
       "\">" + (context.rotors ? report::escaped(rotor_sentence(*context.rotors)) + " " : "") +
       report::escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
   for (const auto& cause : result.causes) {
-    const auto drawn = picture(cause, seen);
-    if (!drawn) return tl::make_unexpected(drawn.error());
     page += "<section><h2>" + report::escaped(spoken(cause.found.form->cause())) + "</h2>\n<p>" +
-            report::escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause, context) + "</section>\n";
+            report::escaped(cause.found.form->formula) + "</p>\n" + picture(cause, seen, data) +
+            figures(cause, context) + "</section>\n";
   }
   if (context.height) page += height_section(*context.height);
-  if (context.rotors) {
-    const auto section = rotor_section(*context.rotors);
-    if (!section) return tl::make_unexpected(section.error());
-    page += *section;
-  }
+  if (context.rotors) page += rotor_section(*context.rotors, data);
   if (context.consequence) page += consequence_section(*context.consequence);
   page += unknown_section(result.unknown);
   page += context.residuals;
@@ -289,8 +281,8 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
     told.push_back(cause.found.form->cause());
     for (const auto& rival : cause.found.rivals) told.push_back(rival.name);
   }
-  page += self_test_section(told);
-  return report::html_page("backwash study", page);
+  const auto moved = report::interactive(data, report::javascript_folders());
+  return report::html_page("backwash study", page + self_test_section(told) + moved.notes, moved.scripts);
 }
 
 }  // namespace backwash::study

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/report/flight_report.hpp"
+#include "core/report/page/interactive.hpp"
 #include "core/report/page/page.hpp"
 #include "core/study/calibrate/bound_figure.hpp"
 #include "core/study/calibrate/model_text.hpp"
@@ -119,18 +120,26 @@ std::string left_out(const Campaign& campaign) {
   return text + "</table>\n</section>\n";
 }
 
-std::string surfaces(const Calibration& c, const Campaign& campaign, double quantile) {
-  std::vector<FigurePlace> places;
-  for (std::size_t i = 0; i < campaign.map_names.size(); ++i)
-    places.push_back({campaign.map_names[i], &campaign.maps[i], i});
-  if (places.empty()) places.push_back({"a flat floor", &campaign.maps.front(), 0});
+/// The variance of each window, by where it hovered.
+report::DataTable windows_of(const Campaign& campaign) {
+  report::DataTable table{"windows", {"flight", "x_m", "y_m", "z_m", "variance_x", "variance_y", "variance_z"}, {}, 0};
+  for (const auto& h : campaign.data.hovers)
+    for (const Vec3& v : h.ln_variance)
+      table.rows.push_back({static_cast<double>(h.flight), h.p_W.x(), h.p_W.y(), h.p_W.z(), std::exp(v.x()),
+                            std::exp(v.y()), std::exp(v.z())});
+  return table;
+}
+
+std::string bounds(const Calibration& c, const Campaign& campaign, double quantile) {
   std::string text;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto figure = bound_figure(campaign.data, c.model, axis, places);
-    if (!figure) throw Failure(kUnavailable, figure.error().message);
     text += std::string("<section><h2>Acceleration along ") + "xyz"[axis] +
-            "</h2>\n<p>Red: variance of each 2 s window. Surface: the bound at quantile " + to_text(quantile, 2) +
-            ", one set of constants for all maps.</p>\n<div class=\"scroll\">" + *figure + "</div></section>\n";
+            "</h2>\n<p>Dots: variance of each 2 s window. Lines: the bound at quantile " + to_text(quantile, 2) +
+            ", one set of constants for all maps.</p>\n";
+    for (std::size_t i = 0; i < campaign.maps.size(); ++i)
+      text += "<h3>" + report::escaped(i < campaign.map_names.size() ? campaign.map_names[i] : "a flat floor") +
+              "</h3>\n" + report::to_svg(bound_chart(campaign.data, c.model, axis, campaign.maps[i], i)) + "\n";
+    text += report::files_html({"windows"}) + "</section>\n";
   }
   return text;
 }
@@ -145,9 +154,12 @@ std::string calibrate_page(const Calibration& c, const Campaign& campaign, std::
   page += refusals_html(refused) + constants(c) +
           bins(c.held_out.by_wall_distance, "distance from walls", "distance, m") +
           bins(c.held_out.by_height, "height", "height, m") + flights(c.held_out, campaign.logs) +
-          surfaces(c, campaign, context.quantile) + left_out(campaign) +
+          bounds(c, campaign, context.quantile) + left_out(campaign) +
           report::parameters_html(own_command(), parameter_files(context.vehicle, context.base_model));
-  return report::html_page("backwash calibration", page);
+  report::PageData data;
+  data.tables.push_back(windows_of(campaign));
+  const auto moved = report::interactive(data, report::javascript_folders());
+  return report::html_page("backwash calibration", page + moved.notes, moved.scripts);
 }
 
 }  // namespace backwash::services

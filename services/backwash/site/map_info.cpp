@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "core/plan/feasibility.hpp"
-#include "core/report/map_picture.hpp"
+#include "core/report/figures.hpp"
 #include "services/backwash/files.hpp"
 #include "services/parallel/parallel.hpp"
 
@@ -40,10 +40,9 @@ void write_picture(const MapInfoOptions& options, const map::OccupancyGrid& grid
     throw Failure(kUnavailable, options.map + ": --height " + to_text(z, 2) +
                                     " is outside the map, whose heights are " + to_text(low.z(), 2) + " to " +
                                     to_text(high.z(), 2));
-  const auto format = options.out.ends_with(".png") ? report::Format::png : report::Format::svg;
-  const auto picture = report::map_picture(grid, z, format);
-  if (!picture) throw Failure(kUnavailable, options.out + ":1: " + picture.error().message);
-  write_file(options.out, *picture, options.force);
+  auto picture = report::seen_from_above(grid, low, high, z, z);
+  picture.x.name += ", at z = " + to_text(z, 2) + " m (white: free)";
+  write_file(options.out, report::picture_file(std::span(&picture, 1), options.out), options.force);
 }
 
 /// Where the vehicle may hover in this map; empty: nowhere.
