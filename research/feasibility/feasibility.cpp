@@ -3,10 +3,11 @@
 
 #include <cstdio>
 
+#include "research/feasibility/set_cost.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/site/world_cache.hpp"
-#include "services/backwash/verb.hpp"
+#include "services/backwash/tool.hpp"
 
 namespace backwash::services {
 namespace {
@@ -148,8 +149,6 @@ int run(const FeasibilityOptions& options) {
   return kOk;
 }
 
-}  // namespace
-
 Verb feasibility_verb(Command& app) {
   auto options = std::make_shared<FeasibilityOptions>();
   auto& command = app.add_subcommand("feasibility", "Where a vehicle can hover safely, and where a way is too tight");
@@ -168,4 +167,10 @@ Verb feasibility_verb(Command& app) {
   return {&command, [options] { return run(*options); }};
 }
 
+}  // namespace
 }  // namespace backwash::services
+
+/// `backwash feasibility`, which runs this program.
+int main(int argc, char** argv) {
+  return backwash::services::run_tool(argc, argv, {backwash::services::feasibility_verb});
+}
