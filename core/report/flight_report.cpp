@@ -17,10 +17,6 @@ std::string number(double value, int decimals, const char* unit) {
   return to_text(value, decimals) + (*unit ? "\u00a0" : "") + unit;
 }
 
-std::string row(const std::string& name, const std::string& value) {
-  return "<tr><th>" + name + "</th><td>" + value + "</td></tr>\n";
-}
-
 std::string point(const Vec3& p) { return to_text(p) + "\u00a0m"; }
 
 std::string verdict(const sim::FlightSummary& s) {
@@ -31,10 +27,9 @@ std::string verdict(const sim::FlightSummary& s) {
   return std::string("<p class=\"verdict ") + (s.ok() ? "passed" : "failed") + "\">" + line + "</p>\n";
 }
 
-std::string table(const sim::Flight& flight, const sim::FlightSummary& s) {
+std::string in_figures(const sim::Flight& flight, const sim::FlightSummary& s) {
   const auto& m = flight.plan.metrics;
-  std::string text = "<section><h2>In figures</h2>\n<table>\n";
-  text += row("Path flown, take-off to hold", number(s.length_m, 2, "m"));
+  std::string text = row("Path flown, take-off to hold", number(s.length_m, 2, "m"));
   text += row("Time", number(s.time_s, 2, "s"));
   text += row("Smallest true clearance on the route, body to obstacle", number(s.clearance_m, 3, "m"));
   text += row("Smallest true clearance during take-off and settling", number(s.take_off_clearance_m, 3, "m"));
@@ -46,20 +41,17 @@ std::string table(const sim::Flight& flight, const sim::FlightSummary& s) {
   text +=
       row("Planning: search / optimisation / verification",
           number(m.search_ms, 0, "ms") + " / " + number(m.optimise_ms, 0, "ms") + " / " + number(m.verify_ms, 0, "ms"));
-  text +=
-      "</table>\n</section>\n<section><h2>Both methods on the same commands</h2>\n"
-      "<p>Exact supports were flown; the ellipsoids of the second-order loop were propagated beside them.</p>\n"
-      "<table>\n<thead><tr><th></th><th>exact supports</th><th>ellipsoids</th></tr></thead>\n";
-  const auto pair = [](const std::string& name, const std::string& a, const std::string& b) {
-    return "<tr><th>" + name + "</th><td>" + a + "</td><td>" + b + "</td></tr>\n";
-  };
-  text += pair("Largest half axis", number(flight.tight.largest_half_axis_m, 3, "m"),
-               number(flight.paper.largest_half_axis_m, 3, "m"));
-  text += pair("Clearance of the swept tube", number(flight.tight.clearance_m, 3, "m"),
-               number(flight.paper.clearance_m, 3, "m"));
-  text += pair("Clear", flight.tight.clearance_m > 0 ? "yes" : "no", flight.paper.clearance_m > 0 ? "yes" : "no");
-  text += pair("Propagation of the tube", number(flight.tight.tube_ms, 1, "ms"), number(flight.paper.tube_ms, 1, "ms"));
-  return text + "</table>\n</section>\n";
+  const auto &tight = flight.tight, &paper = flight.paper;
+  return section("In figures", "", table(text)) +
+         section("Both methods on the same commands",
+                 "Exact supports were flown; the ellipsoids of the second-order loop were propagated beside them.",
+                 table(heads("", "exact supports", "ellipsoids") +
+                       row("Largest half axis", number(tight.largest_half_axis_m, 3, "m"),
+                           number(paper.largest_half_axis_m, 3, "m")) +
+                       row("Clearance of the swept tube", number(tight.clearance_m, 3, "m"),
+                           number(paper.clearance_m, 3, "m")) +
+                       row("Clear", tight.clearance_m > 0 ? "yes" : "no", paper.clearance_m > 0 ? "yes" : "no") +
+                       row("Propagation of the tube", number(tight.tube_ms, 1, "ms"), number(paper.tube_ms, 1, "ms"))));
 }
 
 /// Its figures, each with what it shows as tables in `data`.
@@ -127,7 +119,7 @@ std::string flight_report(const sim::Flight& flight, const sim::FlightSummary& s
   page += scene_html(*data.scene);
   for (const auto& section : sections_of(flight, world, data)) page += to_html(section);
   const auto moved = interactive(data, javascript_folders());
-  page += table(flight, summary) + parameters_html(context.command, context.parameters) + moved.notes;
+  page += in_figures(flight, summary) + parameters_html(context.command, context.parameters) + moved.notes;
   return html_page("backwash flight", page, moved.scripts);
 }
 

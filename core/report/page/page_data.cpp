@@ -213,8 +213,7 @@ std::string files_html(const std::vector<std::string>& tables) {
 }
 
 std::string to_html(const Section& section) {
-  return "<section><h2>" + section.title + "</h2>\n<p>" + section.text + "</p>\n" + section.drawing +
-         files_html(section.tables) + "</section>\n";
+  return report::section(section.title, section.text, section.drawing + files_html(section.tables));
 }
 
 std::string plotted(PageData& data, const DataTable& table, const std::vector<TimePlot>& plots) {

@@ -36,10 +36,6 @@ std::string number(double value) {
   return text;
 }
 
-std::string row(const std::string& name, const std::string& value) {
-  return "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(value) + "</td></tr>\n";
-}
-
 std::string too_few(const Observations& seen) {
   std::size_t good = 0;
   for (std::size_t f = 0; f < seen.units.size(); ++f) good += seen.units.first[f + 1] > seen.units.first[f] ? 1u : 0u;
@@ -97,14 +93,14 @@ std::string rotor_section(const RotorVerdict& v, report::PageData& data) {
                                        std::move(bars),
                                        std::move(most)},
                             .height = 300};
-  return "<section><h2>Rotors against sound flights</h2>\n<p>" + report::escaped(rotor_sentence(v)) + "</p>\n" +
-         report::to_svg(chart) + report::files_html({"rotors"}) + "<table>\n" +
-         row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
-         row("Smallest that is named with 80 % power", percent(v.minimum)) +
-         row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
-         row("Twist, which a weight does not give, t", number(v.t_yaw)) +
-         row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b)) +
-         "</table>\n</section>\n";
+  return report::section(
+      "Rotors against sound flights", report::escaped(rotor_sentence(v)),
+      report::to_svg(chart) + report::files_html({"rotors"}) +
+          report::table(row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
+                        row("Smallest that is named with 80 % power", percent(v.minimum)) +
+                        row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
+                        row("Twist, which a weight does not give, t", number(v.t_yaw)) +
+                        row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b))));
 }
 
 std::string height_sentence(const calibrate::HeightEffects& effects) {
@@ -121,13 +117,9 @@ std::string height_sentence(const calibrate::HeightEffects& effects) {
 std::string height_section(const calibrate::HeightEffects& effects) {
   const auto& all = effects.all;
   const auto& slow = effects.hovers;
-  std::string text =
-      "<section><h2>Vertical variance by height and plate</h2>\n<p>Day and speed held fixed, flights random, 95 % "
-      "intervals by resampling flights. The variance of a pass holds its own acceleration: the hovers alone do "
-      "not.</p>\n<table>\n<tr><th></th><td><b>hovers and passes</b></td><td><b>hovers</b></td></tr>\n";
+  std::string text = report::heads("", "hovers and passes", "hovers");
   const auto line = [&](const std::string& name, auto value) {
-    text += "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(value(all)) + "</td><td>" +
-            report::escaped(slow ? value(*slow) : "none") + "</td></tr>\n";
+    text += row(name, value(all), slow ? value(*slow) : std::string("none"));
   };
   const std::string contrast = number(all.low_m) + " m over the surface against " + number(all.high_m) + " m";
   line(contrast + ", by a law of height", [](auto& h) { return ratio(h.low_over_high); });
@@ -139,7 +131,10 @@ std::string height_section(const calibrate::HeightEffects& effects) {
     return std::to_string(h.windows) + " windows of " + std::to_string(h.flights) + " flights on " +
            std::to_string(h.days) + " days";
   });
-  return text + "</table>\n</section>\n";
+  return report::section("Vertical variance by height and plate",
+                         "Day and speed held fixed, flights random, 95 % intervals by resampling flights. The variance "
+                         "of a pass holds its own acceleration: the hovers alone do not.",
+                         report::table(text));
 }
 
 }  // namespace backwash::study

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "core/report/page/page.hpp"
 #include "core/report/page/page_data.hpp"
 #include "core/study/calibrate/height_effect.hpp"
 #include "core/study/inference/rotors/rotor_reference.hpp"
@@ -14,15 +15,14 @@ namespace backwash::study {
 std::string spoken(std::string name);
 /// Three digits.
 std::string number(double value);
-/// A row of a two-column table; escapes both.
-std::string row(const std::string& name, const std::string& value);
+using report::row;
 
 /// Why no cause is named: how many flights (or groups of them) have good windows, how many are needed, and what was
 /// left out of the others.
 std::string too_few(const Observations& seen);
 
 /// What the motor shares say against those of sound flights, in a sentence, and as a section of the page: what every
-/// rotor would need more, beside the smallest need that would be named. Error: the figure could not be drawn.
+/// rotor would need more, beside the smallest need that would be named; its table comes into `data`.
 std::string rotor_sentence(const RotorVerdict& verdict);
 std::string rotor_section(const RotorVerdict& verdict, report::PageData& data);
 

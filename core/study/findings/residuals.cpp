@@ -109,19 +109,20 @@ std::string residual_section(const Observations& measured, const Told& before, c
                              report::PageData& data) {
   data.along = "window, in the order of the flights";
   data.along_unit = "";
-  std::string text =
-      "<section><h2>Simulated beside measured</h2>\n<p>The set-points of these flights, flown by the simulation in the "
-      "air of the model, before the extension and after it; the mean of several flights with other gusts. Errors are "
-      "root mean squares over windows of 2 s.</p>\n";
-  std::string table = "<table>\n", pictures;
+  std::string rows, pictures;
   for (std::size_t k = 0; k < kChannels; ++k) {
     const auto c = static_cast<Channel>(k);
     const auto b = channel_error(measured, before, c), a = channel_error(measured, after, c);
     if (!b || !a || static_cast<double>(b->windows) < kRules.fewest_compared) continue;
-    table += row(channel_name(c), number(b->value) + " → " + number(a->value));
+    rows += row(channel_name(c), number(b->value) + " → " + number(a->value));
     pictures += picture(measured, before, after, c, data);
   }
-  return text + table + "</table>\n" + pictures + "</section>\n";
+  return report::section(
+      "Simulated beside measured",
+      "The set-points of these flights, flown by the simulation in the air of the model, before the extension and "
+      "after "
+      "it; the mean of several flights with other gusts. Errors are root mean squares over windows of 2 s.",
+      report::table(rows) + pictures);
 }
 
 }  // namespace backwash::study

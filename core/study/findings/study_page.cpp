@@ -138,7 +138,7 @@ std::string acting_rows(const NamedCause& cause, const std::vector<std::string>&
 
 std::string figures(const NamedCause& cause, const PageContext& context) {
   const auto& g = cause.gain;
-  std::string text = "<table>\n" + acting_rows(cause, context.logs);
+  std::string text = acting_rows(cause, context.logs);
   if (context.read_vehicle) text += row("What to change", remedy_of(cause, *context.read_vehicle).words);
   for (const auto& e : cause.found.parameters)
     text += row(spoken(e.name), number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
@@ -163,7 +163,7 @@ std::string figures(const NamedCause& cause, const PageContext& context) {
     text += row("Not told from " + spoken(s.rival),
                 "fly next: " + s.manoeuvre +
                     (s.expected_nats ? " (" + number(*s.expected_nats) + " nats expected from 12 flights)" : ""));
-  return text + "</table>\n";
+  return report::table(text);
 }
 
 std::string share(double value) { return number(100 * value) + " %"; }
@@ -177,12 +177,9 @@ std::string plan_text(const FlightOutcome& o) {
 /// What field, reach and plan make of the causes.
 std::string consequence_section(const Consequence& c) {
   const FlightOutcome &b = c.before, &a = c.after;
-  std::string text =
-      "<section><h2>What it changes for a flight</h2>\n<table>\n<tr><th></th><td style=\"width:22%\"><b>before</b></td>"
-      "<td><b>after</b></td></tr>\n";
+  std::string text = report::heads("", "before", "after");
   const auto line = [&](const std::string& name, const std::string& before, const std::string& after) {
-    text += "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(before) + "</td><td>" +
-            report::escaped(after) + "</td></tr>\n";
+    text += row(name, before, after);
   };
   line("Measured samples inside the bound, flights not fitted", share(b.inside), share(a.inside));
   using Sizes = FlightOutcome::HoverSizes;
@@ -199,53 +196,56 @@ std::string consequence_section(const Consequence& c) {
     const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };
     line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text(b), plan_text(a));
   }
-  return text + "</table>\n<p>" + report::escaped(cost_sentence(c)) + "</p>\n</section>\n";
+  return report::section("What it changes for a flight", report::escaped(cost_sentence(c)), report::table(text));
 }
 
 /// Whether what the accepted causes leave depends on something.
 std::string remaining_section(const std::vector<Dependence>& all, bool counted) {
   if (all.empty()) return "";
-  std::string text = "<section><h2>What remains</h2>\n";
+  constexpr const char* kTitle = "What remains";
   if (!all.front().found)
-    return text + "<p>No dependence left was found (smallest corrected p " + number(all.front().p_holm) + " of " +
-           std::to_string(all.size()) + " tested).</p>\n</section>\n";
-  text += std::string("<p>What remains depends on the following") +
-          (counted ? "." : "; beside a cause the verdict does not count it.") + "</p>\n<table>\n";
+    return report::section(kTitle,
+                           "No dependence left was found (smallest corrected p " + number(all.front().p_holm) + " of " +
+                               std::to_string(all.size()) + " tested).",
+                           "");
+  std::string text;
   for (const auto& d : all)
     if (d.found) text += row(d.group + " on " + d.regressor, "p " + number(d.p_holm) + ", corrected (Holm)");
-  return text + "</table>\n</section>\n";
+  return report::section(kTitle,
+                         std::string("What remains depends on the following") +
+                             (counted ? "." : "; beside a cause the verdict does not count it."),
+                         report::table(text));
 }
 
 std::string unknown_section(const std::vector<UnknownStructure>& unknown) {
   if (unknown.empty()) return "";
-  std::string text = "<section><h2>Without a name</h2>\n<table>\n";
+  std::string text;
   for (const auto& u : unknown)
     text += row(u.group + " along " + u.along + " (" + u.shape + ")",
                 "p " + number(u.p) + (u.gain ? ", " + number(*u.gain) + " nats held out" : ""));
-  return text + "</table>\n</section>\n";
+  return report::section("Without a name", "", report::table(text));
 }
 
 /// What was not tested, what would not have been found, which windows were left out.
 std::string limits_sections(const StudyResult& result, const Observations& seen) {
-  std::string page = "<section><h2>What was not tested, and why</h2>\n<table>\n";
-  for (const auto& [name, why] : result.not_tested) page += row(spoken(name), why);
-  for (const auto& r : result.refused) page += row("Refused: " + spoken(r.name), refusal(r));
-  if (result.not_tested.empty()) page += row("Everything in the catalogue was tested", "");
-  page +=
-      "</table>\n</section>\n<section><h2>Smallest effects that these flights would show</h2>\n"
-      "<p>Found with 80 % power, by injection into these flights with their signs flipped.</p>\n<table>\n";
+  std::string untested, smallest, left_out;
+  for (const auto& [name, why] : result.not_tested) untested += row(spoken(name), why);
+  for (const auto& r : result.refused) untested += row("Refused: " + spoken(r.name), refusal(r));
+  if (result.not_tested.empty()) untested += row("Everything in the catalogue was tested", "");
   if (!result.smallest_looked_for)
-    page += row("Not looked for", "the study was asked without them (--quick), or has too few flights");
+    smallest += row("Not looked for", "the study was asked without them (--quick), or has too few flights");
   else if (result.minimum_detectable.empty())
-    page += row("None", "no effect of the catalogue shows in these flights at a size that it may have");
+    smallest += row("None", "no effect of the catalogue shows in these flights at a size that it may have");
   for (const auto& [cause, sizes] : result.minimum_detectable)
     for (const auto& [parameter, size] : sizes)
-      page += row(std::string(cause).append(", ").append(parameter), number(size));
-  page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";
-  if (seen.gated_out.empty()) page += row("Nothing", "every window was good");
-  for (const auto& [gate, count] : seen.gated_out) page += row(to_string(gate), std::to_string(count) + " windows");
-  page += "</table>\n</section>\n";
-  return page;
+      smallest += row(std::string(cause).append(", ").append(parameter), number(size));
+  if (seen.gated_out.empty()) left_out += row("Nothing", "every window was good");
+  for (const auto& [gate, count] : seen.gated_out) left_out += row(to_string(gate), std::to_string(count) + " windows");
+  return report::section("What was not tested, and why", "", report::table(untested)) +
+         report::section("Smallest effects that these flights would show",
+                         "Found with 80 % power, by injection into these flights with their signs flipped.",
+                         report::table(smallest)) +
+         report::section("Left out", "", report::table(left_out));
 }
 
 }  // namespace
@@ -264,11 +264,9 @@ std::string study_page(const StudyResult& result, const Observations& seen, cons
            : "failed") +
       "\">" + (context.rotors ? report::escaped(rotor_sentence(*context.rotors)) + " " : "") +
       report::escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
-  for (const auto& cause : result.causes) {
-    page += "<section><h2>" + report::escaped(spoken(cause.found.form->cause())) + "</h2>\n<p>" +
-            report::escaped(cause.found.form->formula) + "</p>\n" + picture(cause, seen, data) +
-            figures(cause, context) + "</section>\n";
-  }
+  for (const auto& cause : result.causes)
+    page += report::section(spoken(cause.found.form->cause()), report::escaped(cause.found.form->formula),
+                            picture(cause, seen, data) + figures(cause, context));
   if (context.height) page += height_section(*context.height);
   if (context.rotors) page += rotor_section(*context.rotors, data);
   if (context.consequence) page += consequence_section(*context.consequence);

@@ -137,53 +137,48 @@ report::Scene scene_of(const FlightStory& story, std::span<const log::RawRecord>
   return scene;
 }
 
-std::string row(const std::string& name, const std::string& value) {
-  return "<tr><th>" + name + "</th><td>" + report::escaped(value) + "</td></tr>\n";
-}
-
 std::string figures_table(const FlightStory& s) {
-  std::string text = "<section><h2>In figures</h2>\n<p>" + basis(s) + "</p>\n<table>\n";
-  text += row("The log ends", s.ended);
-  text += row("Time, way in the air", to_text(s.time_s, 2) + " s, " + to_text(s.length_m, 2) + " m");
-  text += row("Take-offs / landings / holds / refused commands",
-              std::to_string(s.take_offs) + " / " + std::to_string(s.landings) + " / " + std::to_string(s.holds) +
-                  " / " + std::to_string(s.refusals));
-  text += row("Clearances", clearances_of(s));
+  std::string text = report::row("The log ends", s.ended);
+  text += report::row("Time, way in the air", to_text(s.time_s, 2) + " s, " + to_text(s.length_m, 2) + " m");
+  text += report::row("Take-offs / landings / holds / refused commands",
+                      std::to_string(s.take_offs) + " / " + std::to_string(s.landings) + " / " +
+                          std::to_string(s.holds) + " / " + std::to_string(s.refusals));
+  text += report::row("Clearances", clearances_of(s));
   if (s.maps.not_judged + s.maps.not_judged_rising > 0)
-    text += row("Ticks without a clearance, on routes / take-offs",
-                std::to_string(s.maps.not_judged) + " / " + std::to_string(s.maps.not_judged_rising));
-  if (s.maps.window_clouds > 0) text += row("Mapper's window", window_of(s.maps));
-  text += row("Largest error over bound, x / y / z", to_text(s.largest_ratio.x(), 2) + " / " +
-                                                         to_text(s.largest_ratio.y(), 2) + " / " +
-                                                         to_text(s.largest_ratio.z(), 2));
-  text += row("Samples inside", std::to_string(s.inside) + " of " + std::to_string(s.judged));
-  text += row("Decided again from what the daemon was told", replay_of(s));
+    text += report::row("Ticks without a clearance, on routes / take-offs",
+                        std::to_string(s.maps.not_judged) + " / " + std::to_string(s.maps.not_judged_rising));
+  if (s.maps.window_clouds > 0) text += report::row("Mapper's window", window_of(s.maps));
+  text += report::row("Largest error over bound, x / y / z", to_text(s.largest_ratio.x(), 2) + " / " +
+                                                                 to_text(s.largest_ratio.y(), 2) + " / " +
+                                                                 to_text(s.largest_ratio.z(), 2));
+  text += report::row("Samples inside", std::to_string(s.inside) + " of " + std::to_string(s.judged));
+  text += report::row("Decided again from what the daemon was told", replay_of(s));
   if (s.beyond_truth > 0)
-    text += row("Ticks that the truth does not cover, judged as measured", std::to_string(s.beyond_truth));
-  text += row("Records lost", std::to_string(s.records_lost));
-  return text + "</table>\n</section>\n";
+    text += report::row("Ticks that the truth does not cover, judged as measured", std::to_string(s.beyond_truth));
+  text += report::row("Records lost", std::to_string(s.records_lost));
+  return report::section("In figures", basis(s), report::table(text));
 }
 
 std::string pieces_table(const FlightStory& s) {
   if (s.pieces.empty()) return "";
-  std::string text = "<section><h2>What was flown</h2>\n<table>\n";
+  std::string text;
   for (const auto& p : s.pieces)
-    text += row(to_text(p.from_s, 2) + " to " + to_text(p.until_s, 2) + " s, " + name_of(p),
-                "to " + to_text(p.goal_W) + " m: " + end_of(p) + "; " + std::to_string(p.inside) + " of " +
-                    std::to_string(p.samples) + " samples inside");
-  return text + "</table>\n</section>\n";
+    text += report::row(to_text(p.from_s, 2) + " to " + to_text(p.until_s, 2) + " s, " + name_of(p),
+                        "to " + to_text(p.goal_W) + " m: " + end_of(p) + "; " + std::to_string(p.inside) + " of " +
+                            std::to_string(p.samples) + " samples inside");
+  return report::section("What was flown", "", report::table(text));
 }
 
 /// Which map judged which part of the way. Nothing where one judged all.
 std::string maps_table(const JudgedMaps& m) {
   if (m.stretches.empty() || (m.stretches.size() == 1 && m.not_judged == 0)) return "";
-  std::string text =
-      "<section><h2>What clearances were judged by</h2>\n<p>Each place by the whole map that was the "
-      "newest then, of " +
-      std::to_string(m.accepted_s.size()) + ".</p>\n<table>\n";
+  std::string text;
   for (const auto& stretch : m.stretches)
-    text += row(to_text(stretch.from_s, 2) + " to " + to_text(stretch.until_s, 2) + " s", by_of(stretch));
-  return text + "</table>\n</section>\n";
+    text += report::row(to_text(stretch.from_s, 2) + " to " + to_text(stretch.until_s, 2) + " s", by_of(stretch));
+  return report::section(
+      "What clearances were judged by",
+      "Each place by the whole map that was the newest then, of " + std::to_string(m.accepted_s.size()) + ".",
+      report::table(text));
 }
 
 }  // namespace
