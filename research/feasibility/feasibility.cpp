@@ -39,20 +39,12 @@ plan::Regions::Number region_of(const plan::World& world, const plan::Regions& r
   return regions.of_voxel[world.grid.linear(v)];
 }
 
-Json to_json(const plan::Region& r, const plan::World&) {
-  return {{"voxels", r.voxels},
-          {"volume_m3", r.volume_m3},
-          {"low", services::to_json(r.low_W)},
-          {"high", services::to_json(r.high_W)},
-          {"widest", {{"p", services::to_json(r.widest_W)}, {"clearance_m", r.widest_clearance_m}}}};
-}
-
 void print_json(const plan::World& world, const plan::Regions& regions, const std::optional<Way>& way,
                 const std::optional<Sets>& sets) {
   Json list = Json::array();
   std::size_t voxels = 0;
   for (const auto& region : regions.regions) {
-    list.push_back(to_json(region, world));
+    list.push_back(services::to_json(region));
     voxels += region.voxels;
   }
   Json json = {{"resolution_m", world.grid.resolution()}, {"hover_safe_voxels", voxels}, {"regions", std::move(list)}};

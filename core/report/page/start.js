@@ -1,6 +1,7 @@
 // Files, timeline and cursor; then all of it begins.
 function csvOf(table) {
-  return [table.columns.join(","), ...table.rows.map((row) => row.map((value) => value === null ? "" : String(value)).join(","))].join("\n") + "\n";
+  const quoted = (name) => name.includes(",") ? `"${name}"` : name;
+  return [table.columns.map(quoted).join(","), ...table.rows.map((row) => row.map((value) => value === null ? "" : String(value)).join(","))].join("\n") + "\n";
 }
 
 function giveFile(name, text) {

@@ -59,15 +59,7 @@ Json flyable_json(const plan::Regions& regions) {
   std::size_t voxels = 0;
   for (const auto& region : regions.regions) voxels += region.voxels;
   Json json = {{"flyable", voxels > 0}, {"hover_safe_voxels", voxels}, {"regions", regions.regions.size()}};
-  json["largest"] = nullptr;
-  if (!regions.regions.empty()) {
-    const auto& largest = regions.regions.front();
-    json["largest"] = {
-        {"volume_m3", largest.volume_m3},
-        {"low", services::to_json(largest.low_W)},
-        {"high", services::to_json(largest.high_W)},
-        {"widest", {{"p", services::to_json(largest.widest_W)}, {"clearance_m", largest.widest_clearance_m}}}};
-  }
+  json["largest"] = regions.regions.empty() ? Json() : services::to_json(regions.regions.front());
   return json;
 }
 
