@@ -31,14 +31,16 @@ struct Geometry {
 
 using Read = tl::expected<Geometry, map::MapError>;
 
-/// Reads a file by the ending of its name: .ply, .csv, .mcap, .obj, .gltf, .glb or .stl, in either case. `topic`:
+/// Reads a file by the ending of its name: .ply, .pcd, .csv, .mcap, .obj, .gltf, .glb or .stl, in either case. `topic`:
 /// of a recording's clouds, where it holds others. Errors, with the file's name: not_found; unknown_name (another
-/// ending; of PCD, LAS, E57 and the like the command that makes a file for us); corrupt (line, byte or element, the
-/// value seen and what would be right); too_large.
+/// ending; of LAS, E57 and the like the command that makes a file for us); corrupt (line, byte or element, the value
+/// seen and what would be right); too_large.
 Read read_geometry(const std::string& path, const std::string& topic = "");
 
 /// The formats by themselves. PLY: ascii and both binary ones, any property types, faces of three and more corners.
 Read read_ply(const std::string& path);
+/// PCD 0.6 and 0.7: ascii, binary and binary_compressed; x, y, z of any type.
+Read read_pcd(const std::string& path);
 /// Columns x_m, y_m, z_m or x, y, z (m), with sensor_x_m, sensor_y_m, sensor_z_m for where each was seen from.
 Read read_point_csv(const std::string& path);
 /// The PointCloud2 of one topic in an MCAP of ROS 2, without compression, in the frame that all others lead to by its

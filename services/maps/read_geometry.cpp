@@ -16,15 +16,14 @@ constexpr struct {
   const char* ending;
   Read (*read)(const std::string& path);
 } kReaders[] = {
-    {".ply", read_ply},   {".csv", read_point_csv}, {".obj", read_mesh},
-    {".gltf", read_mesh}, {".glb", read_mesh},      {".stl", read_mesh},
+    {".ply", read_ply},   {".pcd", read_pcd},  {".csv", read_point_csv}, {".obj", read_mesh},
+    {".gltf", read_mesh}, {".glb", read_mesh}, {".stl", read_mesh},
 };
 
 /// What others read, and what makes a file for us of it: `A` stands for the file's name without its ending.
 constexpr struct {
   const char *ending, *what, *command;
 } kConverters[] = {
-    {".pcd", "a PCD cloud", "pcl_pcd2ply A.pcd A.ply (package pcl-tools)"},
     {".las", "a LAS cloud", "pdal translate A.las A.ply (pdal.io)"},
     {".laz", "a LAZ cloud", "pdal translate A.laz A.ply (pdal.io)"},
     {".e57", "an E57 cloud", "pdal translate A.e57 A.ply (pdal.io)"},
@@ -117,9 +116,9 @@ Read read_geometry(const std::string& path, const std::string& topic) {
       return tl::make_unexpected(
           map::MapError{Kind::unknown_name,
                         message + other.what + " is not read; make one that is: " + converter(other.command, path)});
-  return tl::make_unexpected(
-      map::MapError{Kind::unknown_name, message + "ends in " + (ending.empty() ? "nothing" : ending) +
-                                            "; known are .bt, .ot, .ply, .csv, .mcap, .obj, .gltf, .glb and .stl"});
+  return tl::make_unexpected(map::MapError{
+      Kind::unknown_name, message + "ends in " + (ending.empty() ? "nothing" : ending) +
+                              "; known are .bt, .ot, .ply, .pcd, .csv, .mcap, .obj, .gltf, .glb and .stl"});
 }
 
 }  // namespace backwash::maps

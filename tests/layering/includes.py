@@ -61,7 +61,7 @@ ASKS_THE_STUDY = {"design_main", "design_trial", "matrix", "null_size", "observe
                   "simulation_main", "summary", "weights"}
 # DDS with what idl/ generates, MAVLink, GPIO and sockets, systemd, threads with all that only threads need; core/sync has <atomic>.
 FORBIDDEN = re.compile(r"(\w+/)*(dds|gpio|systemd|mavlink|c?thread|pthread|jthread|s?mutex|shared_mutex|future|condition_variable|"
-                       r"semaphore|barrier|latch|stop_token|execution|omp\.h|tbb|termios|ros2\.h|backwash_msgs|assimp|lz4|zstd)|sys/socket|netinet/|linux/")
+                       r"semaphore|barrier|latch|stop_token|execution|omp\.h|tbb|termios|ros2\.h|backwash_msgs|assimp|liblzf|lz4|zstd)|sys/socket|netinet/|linux/")
 INCLUDE = re.compile(r'^\s*(?:#|%:|\?\?=)\s*(?:include|include_next|import|embed)\b\s*(?:["<]([^">]+)[">])?')
 MODULE = re.compile(r"^\s*(?:export\s+)?(?:import\b(?!\s*[=.(,;])|module\b\s*[\w:;])")
 LITERAL = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', re.S)

@@ -142,14 +142,13 @@ TEST_F(Geometries, TakePointsAndTheirSensorsFromATable) {
 TEST_F(Geometries, TellHowToConvertWhatIsNotRead) {
   refused("room.las", "LASF", "pdal translate " + folder_ + "room.las " + folder_ + "room.ply");
   refused("room.E57", "ASTM-E57", "pdal translate ");
-  refused("room.pcd", "# .PCD v0.7", "pcl_pcd2ply " + folder_ + "room.pcd " + folder_ + "room.ply");
   refused("room.mcap", "", "room.mcap: does not begin as an MCAP file");
   refused("room.dwg", "", "ends in .dwg; known are .bt");
   refused("room", "", "ends in nothing");
 }
 
 TEST_F(Geometries, WaitForNoFifoAndNameAFileThatIsNotThere) {
-  for (const char* name : {"a.ply", "a.csv", "a.obj"}) {
+  for (const char* name : {"a.ply", "a.pcd", "a.csv", "a.obj"}) {
     const auto got = read_geometry(folder_ + name);
     ASSERT_FALSE(got);
     EXPECT_EQ(got.error().kind, map::MapError::Kind::not_found) << name;

@@ -122,7 +122,7 @@ Command& add_convert(Command& group, const std::shared_ptr<MapVerbOptions>& opti
   auto& command = group.add_subcommand("convert", "A mesh, a point cloud or a map of others as a map to fly in");
   command
       .add_option("file", options->map.file,
-                  "OctoMap (.bt, .ot), builtin:NAME, .ply, .csv, .mcap, .obj, .gltf, .glb, .stl")
+                  "OctoMap (.bt, .ot), builtin:NAME, .ply, .pcd, .csv, .mcap, .obj, .gltf, .glb, .stl")
       .required();
   command.add_option("-o,--out", options->out, "binary OctoMap file, .bt").required();
   command.add_option("--resolution", options->map.resolution, "edge of a voxel, m; default an OctoMap's own, else 0.1")
@@ -150,7 +150,7 @@ Command& add_convert(Command& group, const std::shared_ptr<MapVerbOptions>& opti
   command.add_flag("--force", options->force, "overwrite --out");
   command.footer(
       "Example:\n  backwash map convert room.obj --up y --resolution 0.05 --free-from 2,2,1.2 -o room.bt\n"
-      "  backwash map convert scan.ply --points-least 3 --sensor 0,0,1.5 -o scan.bt");
+      "  backwash map convert scan.pcd --points-least 3 --sensor 0,0,1.5 -o scan.bt");
   return command;
 }
 
