@@ -19,6 +19,10 @@ bool some_in(const plan::World& world, const FieldView& view, int layer) {
 
 }  // namespace
 
+Index3 nearest_voxel(const map::OccupancyGrid& grid, const Vec3& p_W) {
+  return grid.index(p_W).cwiseMax(Index3::Zero()).cwiseMin(grid.size() - Index3::Ones());
+}
+
 FieldView field_view(const map::OccupancyGrid& grid, std::span<const Vec3> path_W) {
   Vec3 low = path_W.front(), high = low;
   double height = 0;
@@ -28,10 +32,8 @@ FieldView field_view(const map::OccupancyGrid& grid, std::span<const Vec3> path_
     height += p.z() / static_cast<double>(path_W.size());
   }
   const Vec3 around = Vec3::Constant(2);
-  const auto inside = [&](const Vec3& p) {
-    return Index3(grid.index(p).cwiseMax(Index3::Zero()).cwiseMin(grid.size() - Index3::Ones()));
-  };
-  return {inside(low - around), inside(high + around), height, inside({low.x(), low.y(), height}).z()};
+  return {nearest_voxel(grid, low - around), nearest_voxel(grid, high + around), height,
+          nearest_voxel(grid, {low.x(), low.y(), height}).z()};
 }
 
 FieldBox field_box(const plan::World& world, const FieldView& view, std::size_t most) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <span>
 #include <vector>
 
@@ -9,6 +8,9 @@
 #include "core/reach/bound/bound_code.hpp"
 
 namespace backwash::report {
+
+/// The voxel of a map nearest to a place.
+Index3 nearest_voxel(const map::OccupancyGrid& grid, const Vec3& p_W);
 
 /// Which part of a field a flight's page shows: the voxels around its path, 2 m more on each side, and the layer at its
 /// mean height.
@@ -32,13 +34,5 @@ struct FieldBox {
 /// All heights between which the view's box holds a bound. Where that is more than `most`, every other layer or fewer,
 /// the view's own among them; where one layer alone is, every other voxel of it or fewer.
 FieldBox field_box(const plan::World& world, const FieldView& view, std::size_t most = 300000);
-
-/// Colours of a bound from none to the largest: share of the largest, colour.
-struct PaletteStop {
-  double share;
-  const char* colour;
-};
-inline constexpr std::array<PaletteStop, 6> kFieldPalette{
-    {{0, "#f7fbff"}, {0.15, "#d6e6f4"}, {0.35, "#8fc3dd"}, {0.55, "#f6c667"}, {0.78, "#e8703a"}, {1, "#8b1a1a"}}};
 
 }  // namespace backwash::report

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/report/figures.hpp"
 #include "core/report/flight_data.hpp"
 #include "core/report/page/interactive.hpp"
 #include "core/report/page/page.hpp"
@@ -16,10 +17,6 @@ std::string number(double value, int decimals, const char* unit) {
   return to_text(value, decimals) + (*unit ? "\u00a0" : "") + unit;
 }
 
-std::string row(const std::string& name, const std::string& value) {
-  return "<tr><th>" + name + "</th><td>" + value + "</td></tr>\n";
-}
-
 std::string point(const Vec3& p) { return to_text(p) + "\u00a0m"; }
 
 std::string verdict(const sim::FlightSummary& s) {
@@ -30,10 +27,9 @@ std::string verdict(const sim::FlightSummary& s) {
   return std::string("<p class=\"verdict ") + (s.ok() ? "passed" : "failed") + "\">" + line + "</p>\n";
 }
 
-std::string table(const sim::Flight& flight, const sim::FlightSummary& s) {
+std::string in_figures(const sim::Flight& flight, const sim::FlightSummary& s) {
   const auto& m = flight.plan.metrics;
-  std::string text = "<section><h2>In figures</h2>\n<table>\n";
-  text += row("Path flown, take-off to hold", number(s.length_m, 2, "m"));
+  std::string text = row("Path flown, take-off to hold", number(s.length_m, 2, "m"));
   text += row("Time", number(s.time_s, 2, "s"));
   text += row("Smallest true clearance on the route, body to obstacle", number(s.clearance_m, 3, "m"));
   text += row("Smallest true clearance during take-off and settling", number(s.take_off_clearance_m, 3, "m"));
@@ -45,54 +41,47 @@ std::string table(const sim::Flight& flight, const sim::FlightSummary& s) {
   text +=
       row("Planning: search / optimisation / verification",
           number(m.search_ms, 0, "ms") + " / " + number(m.optimise_ms, 0, "ms") + " / " + number(m.verify_ms, 0, "ms"));
-  text +=
-      "</table>\n</section>\n<section><h2>Both methods on the same commands</h2>\n"
-      "<p>Exact supports were flown; the ellipsoids of the second-order loop were propagated beside them.</p>\n"
-      "<table>\n<thead><tr><th></th><th>exact supports</th><th>ellipsoids</th></tr></thead>\n";
-  const auto pair = [](const std::string& name, const std::string& a, const std::string& b) {
-    return "<tr><th>" + name + "</th><td>" + a + "</td><td>" + b + "</td></tr>\n";
-  };
-  text += pair("Largest half axis", number(flight.tight.largest_half_axis_m, 3, "m"),
-               number(flight.paper.largest_half_axis_m, 3, "m"));
-  text += pair("Clearance of the swept tube", number(flight.tight.clearance_m, 3, "m"),
-               number(flight.paper.clearance_m, 3, "m"));
-  text += pair("Clear", flight.tight.clearance_m > 0 ? "yes" : "no", flight.paper.clearance_m > 0 ? "yes" : "no");
-  text += pair("Propagation of the tube", number(flight.tight.tube_ms, 1, "ms"), number(flight.paper.tube_ms, 1, "ms"));
-  return text + "</table>\n</section>\n";
+  const auto &tight = flight.tight, &paper = flight.paper;
+  return section("In figures", "", table(text)) +
+         section("Both methods on the same commands",
+                 "Exact supports were flown; the ellipsoids of the second-order loop were propagated beside them.",
+                 table(heads("", "exact supports", "ellipsoids") +
+                       row("Largest half axis", number(tight.largest_half_axis_m, 3, "m"),
+                           number(paper.largest_half_axis_m, 3, "m")) +
+                       row("Clearance of the swept tube", number(tight.clearance_m, 3, "m"),
+                           number(paper.clearance_m, 3, "m")) +
+                       row("Clear", tight.clearance_m > 0 ? "yes" : "no", paper.clearance_m > 0 ? "yes" : "no") +
+                       row("Propagation of the tube", number(tight.tube_ms, 1, "ms"), number(paper.tube_ms, 1, "ms"))));
 }
 
-/// Its figures, each with what it shows as tables.
-std::vector<Section> sections_of(const sim::Flight& flight, const plan::World& world,
-                                 const std::vector<DataTable>& tables) {
-  const auto plotted = [&](const std::string& id, std::vector<TimePlot> plots, const char* title, const char* text) {
-    const auto table = std::ranges::find(tables, id, &DataTable::id);
-    return Section{title, text, plots_figure(*table, plots), std::move(plots), {id}};
-  };
-  return {
+/// Its figures, each with what it shows as tables in `data`.
+std::vector<Section> sections_of(const sim::Flight& flight, const plan::World& world, PageData& data) {
+  std::vector<Section> sections = {
       {"From above",
        "Obstacles are those that the tube meets in height, body included. The tube was propagated once, when the "
        "trajectory was accepted.",
-       map_figure(flight, world),
-       {},
+       to_svg(map_chart(flight, world)),
        {"path", "tube"}},
       {"Height along the route",
        "Floor and ceiling at the commanded position.",
-       height_figure(flight, world),
-       {},
+       to_svg(height_chart(flight, world)),
        {"path", "tube"}},
-      field_section(route_of(flight), world),
-      plotted("error", error_plots(true), "Error between its bounds",
-              "Measured position minus the predicted centre. The ellipsoids' bound begins at the moment at which the "
-              "route was accepted."),
-      plotted("clearance",
-              {{"clearance",
-                "clearance",
-                "clearance",
-                "m",
-                {{"clearance_m", "body to the nearest obstacle, true", "flown"},
-                 {"set_clearance_m", "left over by the reachable set", "bound"}}}},
-              "Clearance", "During take-off only what stands beside the vehicle counts."),
+      field_section(route_of(flight), world)};
+  const auto add = [&](const char* id, const char* title, const char* text, std::vector<TimePlot> plots) {
+    add_plots(sections, data, *std::ranges::find(data.tables, id, &DataTable::id), title, text, std::move(plots));
   };
+  add("error", "Error between its bounds",
+      "Measured position minus the predicted centre. The ellipsoids' bound begins at the moment at which the route was "
+      "accepted.",
+      error_plots(true));
+  add("clearance", "Clearance", "During take-off only what stands beside the vehicle counts.",
+      {{"clearance",
+        "clearance",
+        "clearance",
+        "m",
+        {{"clearance_m", "body to the nearest obstacle, true", Kind::flown},
+         {"set_clearance_m", "left over by the reachable set", Kind::bound}}}});
+  return sections;
 }
 
 }  // namespace
@@ -101,8 +90,7 @@ Section field_section(std::span<const Vec3> path_W, const plan::World& world) {
   return {"Disturbance at flight height",
           "Bound of the modelled vertical disturbance, mean and κ standard deviations; white where the vehicle's "
           "centre cannot be. The scene shows it at other heights.",
-          flight_field_figure(path_W, world),
-          {},
+          to_svg(flight_field_chart(path_W, world)),
           {"field"}};
 }
 
@@ -116,8 +104,8 @@ std::string parameters_html(const std::string& command,
   return html + "</section>\n";
 }
 
-tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, const sim::FlightSummary& summary,
-                                                   const plan::World& world, const ReportContext& context) {
+std::string flight_report(const sim::Flight& flight, const sim::FlightSummary& summary, const plan::World& world,
+                          const ReportContext& context) {
   std::string page = "<h1>One flight, and the sets it was planned with</h1>\n";
   page += "<p class=\"context\">Map " + escaped(context.map) + ", vehicle " + escaped(context.vehicle) + ", model " +
           escaped(context.model) + "; from " + point(context.start_W) + " to " + point(context.goal_W) + "; seed " +
@@ -129,14 +117,9 @@ tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, co
   data.scene = flight_scene(flight, world);
   data.field = field_box(world, field_view(world.grid, route_of(flight)));
   page += scene_html(*data.scene);
-  const auto sections = sections_of(flight, world, data.tables);
-  for (const auto& section : sections) data.plots.insert(data.plots.end(), section.plots.begin(), section.plots.end());
-  for (const auto& section : sections) {
-    if (!section.drawing) return tl::make_unexpected(section.drawing.error());
-    page += to_html(section);
-  }
+  for (const auto& section : sections_of(flight, world, data)) page += to_html(section);
   const auto moved = interactive(data, javascript_folders());
-  page += table(flight, summary) + parameters_html(context.command, context.parameters) + moved.notes;
+  page += in_figures(flight, summary) + parameters_html(context.command, context.parameters) + moved.notes;
   return html_page("backwash flight", page, moved.scripts);
 }
 

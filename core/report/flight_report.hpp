@@ -7,8 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/report/page/figures.hpp"
+#include "core/plan/world/world.hpp"
 #include "core/report/page/page_data.hpp"
+#include "core/sim/flight.hpp"
 
 namespace backwash::report {
 
@@ -32,9 +33,8 @@ std::string parameters_html(const std::string& command,
                             const std::vector<std::pair<std::string, std::string>>& parameters);
 
 /// One self-contained HTML page about a flight: verdict, figures, a table of what was measured. Nothing in it refers to
-/// another file or host. Error: a figure that could
-/// not be drawn.
-tl::expected<std::string, PlotError> flight_report(const sim::Flight& flight, const sim::FlightSummary& summary,
-                                                   const plan::World& world, const ReportContext& context);
+/// another file or host.
+std::string flight_report(const sim::Flight& flight, const sim::FlightSummary& summary, const plan::World& world,
+                          const ReportContext& context);
 
 }  // namespace backwash::report

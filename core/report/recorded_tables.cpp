@@ -5,13 +5,12 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <sstream>
 
 #include "core/log/raw/air_log.hpp"
 #include "core/log/raw/tick_log.hpp"
-#include "core/report/page/figure_parts.hpp"
-#include "core/report/page/plot.hpp"
+#include "core/report/figures.hpp"
 #include "core/report/recorded_map.hpp"
+#include "core/types/text.hpp"
 
 namespace backwash::report {
 namespace {
@@ -88,7 +87,7 @@ std::string column(const char* what, std::size_t k) {
 
 /// A plot of one of its quantities, a curve for each class.
 TimePlot air_plot(const DataTable& table, const char* what, const char* name, const char* unit) {
-  constexpr std::array kKinds{"flown", "commanded", "paper", "bound"};
+  constexpr std::array kKinds{Kind::flown, Kind::commanded, Kind::paper, Kind::bound};
   TimePlot plot{std::string("air-") + what, table.id, name, unit, {}};
   for (std::size_t k = 0; k < kAirClasses; ++k)
     if (std::ranges::find(table.columns, column(what, k)) != table.columns.end())
@@ -97,42 +96,40 @@ TimePlot air_plot(const DataTable& table, const char* what, const char* name, co
   return plot;
 }
 
-/// The way from above; each place in the colour of the factor that its class has at the end.
-Figure rough_places(const DataTable& table, const map::OccupancyGrid& grid) {
+/// The way from above, a colour for each class that was flown in, with the factor that it has at the end.
+std::string rough_places(const DataTable& table, const map::OccupancyGrid& grid) {
+  constexpr std::array kKinds{Kind::flown, Kind::commanded, Kind::bound, Kind::before, Kind::measured};
+  std::array<Run, kAirClasses> places;
   Vec3 low = Vec3::Constant(1e9), high = -low;
-  std::ostringstream script;
-  script << "$way << EOD\n";
   for (const auto& row : table.rows) {
     const Vec3 p(row[1], row[2], row[3]);
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
-    const auto at = std::ranges::find(table.columns, column("factor", static_cast<std::size_t>(row[4])));
-    script << p.x() << ' ' << p.y() << ' ' << table.rows.back()[static_cast<std::size_t>(at - table.columns.begin())]
-           << '\n';
+    places[static_cast<std::size_t>(row[4])].push_back(p.head<2>());
   }
-  const auto inside = [&](const Vec3& p) {
-    return Index3(grid.index(p).cwiseMax(Index3::Zero()).cwiseMin(grid.size() - Index3::Ones()));
-  };
-  const Index3 first = inside(low - Vec3(1, 1, 0)), last = inside(high + Vec3(1, 1, 0));
-  script << "EOD\n"
-         << kAxes << cell_blocks(grid, first, last, grid.center(first).z(), grid.center(last).z())
-         << view_from_above(grid, first, last)
-         << "set palette defined (0 '#2f77ba', 0.3 '#e6a23c', 1 '#b3263c')\nset cbrange [1:2 < *]\nset cblabel "
-            "'factor on the variance'\nset key off\nplot "
-         << plot_cells() << "$way using 1:2:3 with points pointtype 7 pointsize 0.5 palette notitle\n";
-  return draw(script.str(), Format::svg, 1000, 520);
+  const Vec3 around(1, 1, 0);
+  Chart chart = seen_from_above(grid, low - around, high + around, low.z(), high.z());
+  for (std::size_t k = 0; k < kAirClasses; ++k) {
+    if (places[k].empty()) continue;
+    const auto at = std::ranges::find(table.columns, column("factor", k)) - table.columns.begin();
+    const std::string factor = to_text(table.rows.back()[static_cast<std::size_t>(at)], 2);
+    chart.layers.push_back({Shape::dots,
+                            kKinds[k % kKinds.size()],
+                            std::string(to_string(static_cast<AirClass>(k))) + ", × " + factor,
+                            {places[k]}});
+  }
+  return to_svg(chart);
 }
 
 void add_places(std::vector<Section>& sections, std::span<const log::RawRecord> log, const DataTable& table) {
   const auto grid = recorded_map(log);
   if (!grid || table.rows.empty()) return;
-  sections.push_back(
-      {"Where the air was rough",
-       "The way flown, from above, as far as it was learnt from. Its colour is the factor that the class "
-       "of the place has at the end; blue is as modelled.",
-       rough_places(table, *grid),
-       {},
-       {table.id}});
+  sections.push_back({"Where the air was rough",
+                      "The way flown, from above, as far as it was learnt from. Its colour is the class of the place; "
+                      "the legend has the "
+                      "factor on the variance that the class has at the end: 1 is as modelled.",
+                      rough_places(table, *grid),
+                      {table.id}});
 }
 
 }  // namespace
@@ -155,9 +152,9 @@ std::vector<TimePlot> error_plots(bool ellipsoids) {
   std::vector<TimePlot> plots;
   for (const std::string axis : {"x", "y", "z"}) {
     TimePlot plot{"error-" + axis, "error", "error along " + axis, "m", {}};
-    plot.curves.push_back({"error_" + axis + "_m", "measured − predicted centre", "flown"});
-    plot.curves.push_back({"bound_" + axis + "_m", "bound", "bound", true});
-    if (ellipsoids) plot.curves.push_back({"ellipsoid_" + axis + "_m", "bound of the ellipsoids", "paper", true});
+    plot.curves.push_back({"error_" + axis + "_m", "measured − predicted centre", Kind::flown});
+    plot.curves.push_back({"bound_" + axis + "_m", "bound", Kind::bound, true});
+    if (ellipsoids) plot.curves.push_back({"ellipsoid_" + axis + "_m", "bound of the ellipsoids", Kind::paper, true});
     plots.push_back(std::move(plot));
   }
   return plots;
@@ -223,22 +220,24 @@ std::vector<Section> recorded_sections(std::span<const log::RawRecord> log, std:
         "ticks",
         "computing, late",
         "µs",
-        {{"compute_us", "computing", "flown"}, {"lateness_us", "late", "commanded"}}},
-       {"ticks-wire", "ticks", "odometry to wire", "µs", {{"odometry_to_wire_us", "odometry to wire", "flown"}}}});
+        {{"compute_us", "computing", Kind::flown}, {"lateness_us", "late", Kind::commanded}}},
+       {"ticks-wire", "ticks", "odometry to wire", "µs", {{"odometry_to_wire_us", "odometry to wire", Kind::flown}}}});
   add(rate_table(log, zero_ns), "Link and odometry rates",
       "Records of each whole second: odometry taken, MAVLink frames received and sent, control ticks.",
       {{"rates-link",
         "rates",
         "frames",
         "1/s",
-        {{"frames_in_hz", "received", "flown"}, {"frames_out_hz", "sent", "commanded"}}},
+        {{"frames_in_hz", "received", Kind::flown}, {"frames_out_hz", "sent", Kind::commanded}}},
        {"rates-odometry",
         "rates",
         "odometry, ticks, scans",
         "1/s",
-        {{"odometry_hz", "odometry", "flown"}, {"ticks_hz", "ticks", "bound"}, {"scans_hz", "scans", "paper"}}}});
+        {{"odometry_hz", "odometry", Kind::flown},
+         {"ticks_hz", "ticks", Kind::bound},
+         {"scans_hz", "scans", Kind::paper}}}});
   add(battery_table(log, zero_ns), "Battery", "Remaining share, as the autopilot says it.",
-      {{"battery", "battery", "battery", "share", {{"battery_share", "remaining", "flown"}}}});
+      {{"battery", "battery", "battery", "share", {{"battery_share", "remaining", Kind::flown}}}});
   return sections;
 }
 

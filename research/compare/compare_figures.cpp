@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <optional>
-#include <sstream>
 
-#include "core/report/page/figure_parts.hpp"
+#include "core/report/recorded_tables.hpp"
 #include "research/compare/compare_report.hpp"
 
 namespace backwash::report {
@@ -14,19 +14,6 @@ std::string short_metres(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f m", value);
   return text;
-}
-
-std::string ratio_block(const Comparison& c, sim::Measure measure) {
-  std::ostringstream block;
-  block << '$' << sim::name(measure) << " << EOD\n";
-  for (std::size_t m = 1; m < c.methods.size(); ++m) {
-    const auto& r = c.table.rows[m].on_common.total[measure];
-    const double low = r.known() ? r.low : r.value, high = r.known() ? r.high : r.value;
-    block << m << ' ' << r.value << ' ' << low << ' ' << high << " \""
-          << (c.methods[m].margin ? short_metres(*c.methods[m].margin) : c.methods[m].name) << "\"\n";
-  }
-  block << "EOD\n";
-  return block.str();
 }
 
 }  // namespace
@@ -39,57 +26,58 @@ std::optional<double> paper_jerk2_ratio(const sim::CompareMethod& method) {
   return std::nullopt;
 }
 
-tl::expected<std::string, PlotError> ratio_figure(const Comparison& c) {
+std::string ratio_figure(const Comparison& c) {
   const std::pair<sim::Measure, const char*> panels[] = {
       {sim::kJerk2, "jerk²"}, {sim::kLength, "length"}, {sim::kTime, "time"}, {sim::kEnergy, "energy"}};
-  std::ostringstream script;
-  script << "$paper << EOD\n";
-  bool any_paper = false;
+  const auto right = static_cast<double>(c.methods.size()) - 0.5;
+  Axis over{"", 0.5, right};
+  Layer papers{Shape::dots, Kind::commanded, "the paper’s", {{}}};
   for (std::size_t m = 1; m < c.methods.size(); ++m) {
-    if (const auto ratio = paper_jerk2_ratio(c.methods[m])) script << m << ' ' << *ratio << '\n', any_paper = true;
+    over.words.push_back(c.methods[m].margin ? short_metres(*c.methods[m].margin) : c.methods[m].name);
+    if (const auto ratio = paper_jerk2_ratio(c.methods[m])) papers.runs[0].push_back({static_cast<double>(m), *ratio});
   }
-  if (!any_paper) script << "0 NaN\n";
-  script << "EOD\n";
-  for (const auto& panel : panels) script << ratio_block(c, panel.first);
-  script << kAxes << "set xrange [0.5:" << static_cast<double>(c.methods.size()) - 0.5
-         << "]\nset xtics rotate by -35 nomirror\nset bmargin 5\nunset key\nset multiplot layout 1,4\n";
+  std::string html;
   for (const auto& [measure, title] : panels) {
-    script << "set title '" << title << ", proposed over'\n"
-           << "set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead linecolor '#888888' dashtype 3\n"
-           << "set yrange [" << (measure == sim::kJerk2 ? "0:*" : "*:*") << "]\nplot $" << sim::name(measure)
-           << " using 1:2:3:4:xtic(5) with yerrorbars pointtype 7 pointsize 0.8 linewidth 2 linecolor '#0b3d91'";
-    if (measure == sim::kJerk2)
-      script << ", $paper using 1:2 with points pointtype 4 pointsize 1.2 linewidth 2 linecolor '#d1495b'";
-    script << '\n';
+    Layer ratios{Shape::dots, Kind::flown, std::string(title) + ", proposed over", {{}}};
+    Layer bars{Shape::line, Kind::flown, "", {}};
+    for (std::size_t m = 1; m < c.methods.size(); ++m) {
+      const auto& r = c.table.rows[m].on_common.total[measure];
+      const auto at = static_cast<double>(m);
+      ratios.runs[0].push_back({at, r.value});
+      if (r.known()) bars.runs.push_back({{at, r.low}, {at, r.high}});
+    }
+    Chart chart{
+        .x = over,
+        .y = {title},
+        .layers = {{Shape::line, Kind::paper, "", {{{0.5, 1}, {right, 1}}}}, std::move(bars), std::move(ratios)},
+        .height = 220};
+    if (measure == sim::kJerk2) {
+      chart.layers.push_back(papers);
+      chart.layers.push_back({Shape::line, Kind::paper, "", {{{0.5, 0}}}});  // its axis begins at 0
+    }
+    html += to_svg(chart) + "\n";
   }
-  script << "unset multiplot\n";
-  return draw(script.str(), Format::svg, 1000, 360);
+  return html;
 }
 
-tl::expected<std::string, PlotError> gap_figure(const sim::GapCampaign& gap) {
-  std::ostringstream script;
-  script << "$error << EOD\n";
+std::string gap_figure(const sim::GapCampaign& gap, PageData& data) {
+  DataTable table{
+      gap.vehicle, {"t_s", "error_x_m", "bound_x_m", "error_y_m", "bound_y_m", "error_z_m", "bound_z_m"}, {}, 0};
+  for (auto& letter : table.id)
+    if (!std::isalnum(static_cast<unsigned char>(letter))) letter = '_';
   for (std::size_t k = 0; k < gap.shown.size(); ++k) {
-    script << static_cast<double>(k) * kControlPeriod;
-    for (const auto d : {kX, kY, kZ}) script << ' ' << gap.shown[k].error[d] << ' ' << gap.shown[k].half_widths[d];
-    script << '\n';
+    table.rows.push_back({static_cast<double>(k) * kControlPeriod});
+    for (const auto d : {kX, kY, kZ}) {
+      table.rows.back().push_back(gap.shown[k].error[d]);
+      table.rows.back().push_back(gap.shown[k].half_widths[d]);
+    }
   }
-  script << "EOD\n"
-         << kAxes << "set lmargin 10\nset ytics font ',10'\nset key outside top center horizontal\n"
-         << "set multiplot layout 3,1\n";
-  const char* const axes[] = {"x", "y", "z"};
-  for (int a = 0; a < 3; ++a) {
-    const int e = 2 + 2 * a, h = 3 + 2 * a;
-    if (a == 1) script << "unset key\n";
-    if (a == 2) script << "set xlabel 'time since the plan was accepted, s'\n";
-    script << "set ylabel 'error along " << axes[a] << ", m'\nplot $error using 1:(-$" << h << "):" << h
-           << " with filledcurves linecolor '#d9e9f8' title 'between the bounds', $error using 1:" << h
-           << " with lines linewidth 1.5 linecolor '#b23a48' title 'upper bound', $error using 1:(-$" << h
-           << ") with lines linewidth 1.5 linecolor '#2e7d4f' title 'lower bound', $error using 1:" << e
-           << " with lines linewidth 2 linecolor '#0b3d91' title 'measured − predicted centre'\n";
+  auto plots = error_plots(false);
+  for (auto& plot : plots) {
+    plot.table = table.id;
+    plot.id = table.id + "-" + plot.id;
   }
-  script << "unset multiplot\n";
-  return draw(script.str(), Format::svg, 1000, 720);
+  return plotted(data, table, plots) + files_html({table.id});
 }
 
 }  // namespace backwash::report

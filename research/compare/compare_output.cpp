@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <sstream>
 
+#include "research/compare/compare_rows.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
@@ -154,9 +155,7 @@ std::string to_csv(const report::Comparison& c) {
           csv << ",,,,,,,,,,,,,," << planning(o) << '\n';
           continue;
         }
-        csv << ',' << o.planned.length_m << ',' << o.planned.time_s << ',' << o.planned.jerk2 << ',' << o.flown_m << ','
-            << o.flown_jerk2 << ',' << o.energy_J << ',' << o.clearance_m << ',' << o.samples << ',' << o.contacts
-            << ',' << o.outside;
+        each_kept(o, [&](const char*, auto value) { csv << ',' << value; });
         for (int axis = 0; axis < 3; ++axis) csv << ',' << o.largest_ratio[axis];
         csv << ',' << planning(o) << '\n';
       }

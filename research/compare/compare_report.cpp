@@ -3,26 +3,23 @@
 
 #include <sstream>
 
+#include "core/report/page/interactive.hpp"
 #include "core/report/page/page.hpp"
 #include "core/types/formatted.hpp"
 
 namespace backwash::report {
 namespace {
 
-std::string table_row(const char* cell, const std::vector<std::string>& cells) {
-  std::string row = "<tr>";
-  for (const auto& c : cells) row += std::string("<") + cell + ">" + c + "</" + cell + ">";
-  return row + "</tr>\n";
-}
-
-std::string table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows) {
-  std::string html = "<table class=\"wide\">\n<thead>" + table_row("th", head) + "</thead>\n";
-  for (const auto& row : rows) html += table_row("td", row);
-  return html + "</table>\n";
-}
-
-std::string section(const std::string& title, const std::string& words, const std::string& content) {
-  return "<section><h2>" + title + "</h2>\n<p>" + words + "</p>\n" + content + "</section>\n";
+/// A table: names of its columns, then its rows, as text.
+std::string cells(const std::vector<std::string>& names, const std::vector<std::vector<std::string>>& rows) {
+  const auto line = [](const std::vector<std::string>& texts, const char* tag) {
+    std::string html = "<tr>";
+    for (const auto& text : texts) html += std::string("<") + tag + ">" + escaped(text) + "</" + tag + ">";
+    return html + "</tr>\n";
+  };
+  std::string html = "<thead>" + line(names, "th") + "</thead>\n";
+  for (const auto& row : rows) html += line(row, "td");
+  return table(html, true);
 }
 
 /// "12 (start 3, no path 9)": pairs without a flight, by reason.
@@ -65,7 +62,7 @@ std::string table_one(const Comparison& c) {
       formatted("Length, time, jerk² and energy are totals over the %zu start–goal pairs that all methods solve; "
                 "everything else counts all %zu pairs.",
                 c.table.common_pairs, c.table.rows.front().pairs),
-      table(head, rows));
+      cells(head, rows));
 }
 
 std::string ratios(const Comparison& c) {
@@ -82,7 +79,7 @@ std::string ratios(const Comparison& c) {
                       with_interval(ratio->total[sim::kEnergy])});
     }
   }
-  return table({"over", "pairs", "jerk², totals", "the paper’s", "jerk², geometric mean",
+  return cells({"over", "pairs", "jerk², totals", "the paper’s", "jerk², geometric mean",
                 "jerk²·time⁵/length², geometric mean", "length", "time", "energy"},
                rows);
 }
@@ -93,53 +90,50 @@ std::string by_scene(const Comparison& c) {
   std::vector<std::vector<std::string>> rows;
   for (const auto& scene : c.scenes) {
     const auto part = sim::tabulate(std::span(&scene, 1), c.methods, c.seed);
-    std::vector<std::string> row = {escaped(scene.scene), escaped(scene.vehicle), std::to_string(scene.pairs.size())};
+    std::vector<std::string> row = {scene.scene, scene.vehicle, std::to_string(scene.pairs.size())};
     for (const auto& r : part.rows)
       row.push_back(std::to_string(r.solved) + (r.contacts > 0 ? formatted(" (%zu with contact)", r.contacts) : ""));
     rows.push_back(std::move(row));
   }
-  return section("Pairs solved, by scene", "A pair that a method does not solve counts as no path.", table(head, rows));
+  return section("Pairs solved, by scene", "A pair that a method does not solve counts as no path.", cells(head, rows));
 }
 
 std::string demanded(const Comparison& c) {
-  std::string html = "<table class=\"wide\">\n";
+  std::string html;
   for (const auto& demand : c.demands)
     html += std::string("<tr><td class=\"") + (demand.met ? "passed\">met" : "failed\">missed") + "</td><td>" +
             escaped(demand.text) + "</td></tr>\n";
   return section(
       "Demanded of the proposed method",
       "Jerk² counts as below when its whole interval is; margins with more contacts are not held against it.",
-      html + "</table>\n");
+      table(html, true));
 }
 
 }  // namespace
 
-tl::expected<std::string, PlotError> comparison_report(const Comparison& c) {
+std::string comparison_report(const Comparison& c) {
+  PageData data;
   std::string body = "<h1>The same routes with other clearances</h1>\n<p class=\"context\">" +
                      formatted("%zu start–goal pairs a scene and vehicle, seed %llu; backwash ", c.flights,
                                static_cast<unsigned long long>(c.seed)) +
                      escaped(c.version) + "</p>\n" + demanded(c) + table_one(c);
-  if (c.table.common_pairs > 0) {
-    const auto figure = ratio_figure(c);
-    if (!figure) return tl::make_unexpected(figure.error());
+  if (c.table.common_pairs > 0)
     body += section(
         "The proposed method over the others",
         "Below 1 the proposed method needs less. Bars are paired 95 % intervals from 2,000 bootstrap samples of "
-        "the pairs; squares are the paper’s ratios. A slower plan has less jerk: jerk²·time⁵/length² takes that out.",
-        *figure + ratios(c));
-  }
-  for (const auto& gap : c.gaps) {
-    const auto figure = gap_figure(gap);
-    if (!figure) return tl::make_unexpected(figure.error());
+        "the pairs; the paper’s ratios are dots without one. A slower plan has less jerk: jerk²·time⁵/length² takes "
+        "that out.",
+        ratio_figure(c) + ratios(c));
+  for (const auto& gap : c.gaps)
     body += section(
-        "Through the narrow gap: " + escaped(gap.vehicle),
+        "Through the narrow gap: " + gap.vehicle,
         formatted("Measured position minus the predicted centre, first of %zu flights. Largest error over bound of "
                   "all of them: x %.2f, y %.2f, z %.2f; %zu of %zu samples outside; %zu flights with contact.",
                   gap.flights, gap.largest_ratio.x(), gap.largest_ratio.y(), gap.largest_ratio.z(), gap.outside,
                   gap.samples, gap.contacts),
-        *figure);
-  }
-  return html_page("backwash compare", body + by_scene(c));
+        gap_figure(gap, data));
+  const auto moved = interactive(data, javascript_folders());
+  return html_page("backwash compare", body + by_scene(c) + moved.notes, moved.scripts);
 }
 
 }  // namespace backwash::report

@@ -4,10 +4,9 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <tl/expected.hpp>
 #include <vector>
 
-#include "core/report/page/plot.hpp"
+#include "core/report/page/page_data.hpp"
 #include "research/compare/compare_statistics.hpp"
 
 namespace backwash::report {
@@ -30,11 +29,11 @@ std::optional<double> paper_jerk2_ratio(const sim::CompareMethod& method);
 
 /// First method over each of the others on the pairs that all solve: jerk², length, time and energy with their
 /// intervals, the paper's ratios beside.
-tl::expected<std::string, PlotError> ratio_figure(const Comparison& comparison);
-/// Errors between their bounds on three axes through the narrow gap.
-tl::expected<std::string, PlotError> gap_figure(const sim::GapCampaign& gap);
+std::string ratio_figure(const Comparison& comparison);
+/// Errors between their bounds on three axes through the narrow gap; their table and plots come into `data`.
+std::string gap_figure(const sim::GapCampaign& gap, PageData& data);
 
 /// One self-contained HTML page: what was demanded, Table I, the ratios, the narrow gap, each scene.
-tl::expected<std::string, PlotError> comparison_report(const Comparison& comparison);
+std::string comparison_report(const Comparison& comparison);
 
 }  // namespace backwash::report

@@ -22,17 +22,8 @@ constexpr std::array kStatuses = {PlanStatus::ok,           PlanStatus::no_path,
 Json row_of(const sim::RouteOutcome& o) {
   Json row = {{"status", plan::to_string(o.status)}};
   if (o.status != PlanStatus::ok) return row;
-  row.update({{"length_m", o.planned.length_m},
-              {"time_s", o.planned.time_s},
-              {"jerk2", o.planned.jerk2},
-              {"flown_m", o.flown_m},
-              {"flown_jerk2", o.flown_jerk2},
-              {"energy_J", o.energy_J},
-              {"clearance_m", o.clearance_m},
-              {"samples", o.samples},
-              {"contact_samples", o.contacts},
-              {"samples_outside", o.outside},
-              {"largest_ratio", services::to_json(o.largest_ratio)}});
+  each_kept(o, [&](const char* name, auto value) { row[name] = value; });
+  row["largest_ratio"] = services::to_json(o.largest_ratio);
   return row;
 }
 
@@ -48,16 +39,7 @@ sim::RouteOutcome outcome_of(const Json& row) {
   o.status = *known;
   o.clearance_m = std::numeric_limits<double>::infinity();  // as measure() leaves it without a flight
   if (o.status != PlanStatus::ok) return o;
-  o.planned.length_m = row.at("length_m");
-  o.planned.time_s = row.at("time_s");
-  o.planned.jerk2 = row.at("jerk2");
-  o.flown_m = row.at("flown_m");
-  o.flown_jerk2 = row.at("flown_jerk2");
-  o.energy_J = row.at("energy_J");
-  o.clearance_m = row.at("clearance_m");
-  o.samples = row.at("samples");
-  o.contacts = row.at("contact_samples");
-  o.outside = row.at("samples_outside");
+  each_kept(o, [&](const char* name, auto& member) { row.at(name).get_to(member); });
   o.largest_ratio = point_of(row.at("largest_ratio"));
   return o;
 }

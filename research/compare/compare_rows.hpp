@@ -17,4 +17,19 @@ std::string to_rows(const report::Comparison& comparison, std::size_t first);
 /// or out of order, and a scene without `flights` of them.
 void add_rows(report::Comparison& comparison, const std::string& path);
 
+/// Calls `each(name, member)` for the numbers that are kept of a flown plan, in their order: rows and CSV go through
+/// these. `outcome`: a sim::RouteOutcome, const or not.
+void each_kept(auto& outcome, const auto& each) {
+  each("length_m", outcome.planned.length_m);
+  each("time_s", outcome.planned.time_s);
+  each("jerk2", outcome.planned.jerk2);
+  each("flown_m", outcome.flown_m);
+  each("flown_jerk2", outcome.flown_jerk2);
+  each("energy_J", outcome.energy_J);
+  each("clearance_m", outcome.clearance_m);
+  each("samples", outcome.samples);
+  each("contact_samples", outcome.contacts);
+  each("samples_outside", outcome.outside);
+}
+
 }  // namespace backwash::services

@@ -125,9 +125,7 @@ int run(const CompareOptions& options) {
   if (!options.out.empty()) write_file(options.out, to_csv(comparison), options.force);
   if (!options.report.empty()) {
     progress("drawing the report");
-    const auto page = report::comparison_report(comparison);
-    if (!page) throw Failure(kUnavailable, options.report + ":1: " + page.error().message);
-    write_file(options.report, *page, options.force);
+    write_file(options.report, report::comparison_report(comparison), options.force);
   }
   options.json ? print(services::to_json(comparison)) : services::print_text(comparison);
   if (interrupted())

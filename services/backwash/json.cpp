@@ -52,6 +52,14 @@ Json to_json(const plan::PlanMetrics& m) {
           {"evaluations", m.evaluations}};
 }
 
+Json to_json(const plan::Region& r) {
+  return {{"voxels", r.voxels},
+          {"volume_m3", r.volume_m3},
+          {"low", to_json(r.low_W)},
+          {"high", to_json(r.high_W)},
+          {"widest", {{"p", to_json(r.widest_W)}, {"clearance_m", r.widest_clearance_m}}}};
+}
+
 void print(const Json& json) {
   // A file's name may be no UTF-8; JSON is.
   std::printf("%s\n", json.dump(-1, ' ', false, Json::error_handler_t::replace).c_str());

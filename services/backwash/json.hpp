@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/plan/feasibility.hpp"
 #include "core/plan/planner.hpp"
 #include "core/reach/reach_tube.hpp"
 #include "core/types/disturbance.hpp"
@@ -21,6 +22,7 @@ Json symmetric_to_json(const Mat3& shape);
 /// Steps of a tube; `shape` only where the method is paper. With a direction, `support` along it, m.
 Json to_json(const reach::ReachTube& tube, reach::Method method, const std::optional<Vec3>& direction = std::nullopt);
 Json to_json(const plan::PlanMetrics& metrics);
+Json to_json(const plan::Region& region);
 
 /// Support of a step's set along a unit direction, m: √(nᵀ Q n) for paper; for tight the octagonal prism's, exact along
 /// the five directions and an upper bound between them.

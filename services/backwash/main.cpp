@@ -10,28 +10,35 @@ namespace {
 
 using namespace backwash::services;
 
-/// A program of the source tree beside this one, which packages do not hold (research/compare).
-std::string compare_program() {
-  return (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "backwash-compare").string();
+/// A program of the source tree beside this one, which packages do not hold (research/).
+std::string program(const std::string& verb) {
+  return (std::filesystem::read_symlink("/proc/self/exe").parent_path() / ("backwash-" + verb)).string();
 }
 
-/// What is left of the verb where that program is not there.
-Verb compare_verb(Command& app) {
-  auto& command = app.add_subcommand(
-      "compare", "The paper's Table I: sets against constant margins, flown in closed loop (source tree alone)");
-  return {&command, []() -> int {
+/// What is left of a verb where its program is not there.
+Verb elsewhere(Command& app, const char* name, const char* about) {
+  return {&app.add_subcommand(name, std::string(about) + " (source tree alone)"), [name]() -> int {
             throw Failure(backwash::kUnavailable,
-                          compare_program() +
+                          program(name) +
                               ":1: is not there; build the source tree (./fly), and run the backwash "
                               "of its build/release/services");
           }};
 }
 
+Verb compare_verb(Command& app) {
+  return elsewhere(app, "compare", "The paper's Table I: sets against constant margins, flown in closed loop");
+}
+
+Verb feasibility_verb(Command& app) {
+  return elsewhere(app, "feasibility", "Where a vehicle can hover safely, and where a way is too tight");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc > 1 && std::string_view(argv[1]) == "compare") {
-    ::execv(compare_program().c_str(), argv);
+  const std::string_view verb = argc > 1 ? argv[1] : "";
+  if (verb == "compare" || verb == "feasibility") {
+    ::execv(program(std::string(verb)).c_str(), argv);
     if (argc < 3 || std::string_view(argv[2]) != "--help") argc = 2;  // its options are that program's
   }
   return run_tool(argc, argv,

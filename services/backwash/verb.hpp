@@ -34,7 +34,6 @@ Verb field_verb(Command& app);
 Verb reach_verb(Command& app);
 Verb plan_verb(Command& app);
 Verb simulate_verb(Command& app);
-Verb feasibility_verb(Command& app);
 Verb report_verb(Command& app);
 Verb calibrate_verb(Command& app);
 Verb import_verb(Command& app);

@@ -16,7 +16,7 @@ set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 set(CPACK_DEBIAN_BACKWASH_PACKAGE_NAME backwash)
 set(CPACK_DEBIAN_BACKWASH_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_BACKWASH_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_BACKWASH_PACKAGE_RECOMMENDS "gnuplot-nox, libjs-dygraphs, libjs-three")
+set(CPACK_DEBIAN_BACKWASH_PACKAGE_RECOMMENDS "libjs-three")
 set(CPACK_COMPONENT_BACKWASH_DESCRIPTION "quadrotor flight daemon that plans by reachable sets of its own wash
 Daemon, ground station and offline tools: estimates the disturbance that a
 quadrotor's rotor wash causes near floors, walls and corners from a voxel map,

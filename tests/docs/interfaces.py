@@ -140,6 +140,7 @@ def check_json(root: pathlib.Path, text: str, sections_of: dict[str, str]) -> No
     named = {part for q in quoted(text) for part in re.findall(r"[A-Za-z_]\w*", q)}
     files = [*(root / "services/backwash").rglob("*.cpp"),
              *(root / name for name in ("research/compare/compare_output.cpp", "research/compare/compare_rows.cpp",
+                                        "research/feasibility/feasibility.cpp",
                                         "services/backwashctl/status_output.cpp", "services/backwashctl/verbs.cpp"))]
     not_output = {"flight_spec.cpp", "import.cpp", "main.cpp", "story_page.cpp"}
     written = set()

@@ -29,7 +29,7 @@ std::size_t count(const std::string& text, const std::string& what) {
 PageData data_with_a_plot() {
   PageData data;
   data.tables.push_back({"height", {"t_s", "z_m"}, {{0, 1.25}, {1, kNoValue}, {2, 0.1 + 0.2}}, 0});
-  data.plots.push_back({"height", "height", "height", "m", {{"z_m", "flown", "flown"}}});
+  data.plots.push_back({"height", "height", "height", "m", {{"z_m", "flown", Kind::flown}}});
   return data;
 }
 
@@ -107,26 +107,42 @@ TEST(Thinned, KeepsEachPeakAndEachRowAsItWas) {
   EXPECT_EQ(thinned(few, 5000).rows.size(), few.rows.size());
 }
 
-TEST(Interactive, SaysWhatToInstallWhereALibraryIsMissing) {
-  const auto page = interactive(data_with_a_plot(), {"/nonexistent"});
-  EXPECT_NE(page.notes.find("install Debian's libjs-dygraphs"), std::string::npos);
-  EXPECT_EQ(page.notes.find("libjs-three"), std::string::npos) << "nothing on the page needs it";
-  auto with_scene = data_with_a_plot();
-  with_scene.scene = Scene{"height", {}, {}, 0.2};
-  EXPECT_NE(interactive(with_scene, {}).notes.find("libjs-dygraphs and libjs-three"), std::string::npos);
+TEST(Interactive, SaysWhatToInstallWhereTheLibraryIsMissing) {
+  auto data = data_with_a_plot();
+  EXPECT_EQ(interactive(data, {}).notes.find("libjs-three"), std::string::npos) << "nothing on the page needs it";
+  data.scene = Scene{"height", {}, {}, 0.2};
+  EXPECT_NE(interactive(data, {"/nonexistent"}).notes.find("install Debian's libjs-three"), std::string::npos);
 }
 
 TEST(Interactive, CopiesTheLibraryInWithItsLicenceAndNothingInItEndsTheScript) {
   const auto folder = fs::temp_directory_path() / ("backwash_libraries." + std::to_string(::getpid()));
-  fs::create_directories(folder / "dygraphs");
-  std::ofstream(folder / "dygraphs/dygraph.min.js") << "var a = '</script>', b = /</.test('<');";
-  const auto page = interactive(data_with_a_plot(), {"/nonexistent", folder});
+  fs::create_directories(folder / "three");
+  std::ofstream(folder / "three/three.min.js") << "var a = '</script>', b = /</.test('<');";
+  auto data = data_with_a_plot();
+  data.scene = Scene{"height", {}, {}, 0.2};
+  const auto page = interactive(data, {"/nonexistent", folder});
   fs::remove_all(folder);
   EXPECT_NE(page.scripts.find("var a = '<\\/script>', b = /</.test('<');"), std::string::npos);
   EXPECT_EQ(count(page.scripts, "<script"), count(page.scripts, "</script"));
   EXPECT_NE(page.scripts.find("MIT licence"), std::string::npos);
   EXPECT_NE(page.notes.find("Permission is hereby granted"), std::string::npos);
   EXPECT_EQ(page.notes.find("install"), std::string::npos);
+}
+
+TEST(Plotted, IsOneChartAPlotWithItsTableOnceAndABandBetweenBounds) {
+  PageData data;
+  const DataTable table{"error", {"t_s", "e_m", "h_m"}, {{0, 0.1, 0.2}, {1, kNoValue, 0.3}, {2, 0.2, 0.2}}, 0};
+  const TimePlot plot{"a", "error", "error", "m", {{"e_m", "e", Kind::flown}, {"h_m", "h", Kind::bound, true}}};
+  auto other = plot;
+  other.id = "b";
+  const auto html = plotted(data, table, {plot, other});
+  EXPECT_EQ(count(html, "<svg"), 2u);
+  EXPECT_EQ(count(html, "data-plot=\"a\""), 1u);
+  EXPECT_EQ(count(html, "class=\"band\""), 2u);
+  EXPECT_EQ(data.tables.size(), 1u);
+  EXPECT_EQ(data.plots.size(), 2u);
+  const auto line = html.substr(html.find("<path class=\"flown\"", html.find("class=\"area\"")), 400);
+  EXPECT_EQ(count(line.substr(0, line.find("/>")), "M"), 2u) << "a gap is none that a line crosses: " << line;
 }
 
 TEST(Timeline, ShowsWhatOthersChoseAsText) {

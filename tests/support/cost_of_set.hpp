@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <vector>
 
-#include "core/plan/feasibility.hpp"
 #include "core/reach/clearance.hpp"
 #include "core/reach/response/integrator.hpp"
+#include "research/feasibility/set_cost.hpp"
 
 namespace backwash::test {
 

@@ -85,5 +85,5 @@ kept = open("kept.html").read()
 assert "Not determined" in kept and all(html.escape(r["flight"]) in kept for r in refused["refused"])
 flat = open("flat.html").read()
 assert "a flat floor" in flat
-assert page.count("<svg") == 3 and not re.search(r'(src|href)\s*=\s*["\']?(https?:|//|file:)', page)
+assert page.count("<svg") == 6 and not re.search(r'(src|href)\s*=\s*["\']?(https?:|//|file:)', page)
 PYTHON

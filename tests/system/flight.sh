@@ -38,6 +38,6 @@ assert all(abs(float(b["t_s"]) - float(a["t_s"]) - 0.02) < 1e-9 for a, b in zip(
 end = [float(rows[-1][c]) for c in ("x_m", "y_m", "z_m")]
 assert max(abs(a - b) for a, b in zip(end, flight["goal"])) < 0.3
 page = open("flight.html").read()
-assert page.count("<svg") == 5 and "</html>" in page
+assert page.count("<svg") == 7 and "</html>" in page
 assert not re.search(r'(src|href)\s*=\s*["\']?(https?:|//|file:)', page), "the report refers to something outside itself"
 PYTHON

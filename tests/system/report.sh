@@ -5,12 +5,11 @@
 # so what has to be told is known.
 #   report.sh BACKWASH
 source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
-command -v gnuplot >/dev/null && drawn=yes || drawn=no
-PYTHONPATH=$here python3 - "$backwash" "$drawn" <<'PYTHON'
+PYTHONPATH=$here python3 - "$backwash" <<'PYTHON'
 import json, math, os, random, re, subprocess, sys
 from raw_log_maker import *
 
-backwash, drawn = sys.argv[1], sys.argv[2] == "yes"
+backwash = sys.argv[1]
 
 
 def told(log, code, *options, most=None):
@@ -193,12 +192,11 @@ story, _ = told(log, 1)
 assert story["touched"] and story["min_clearance_m"] < 0 and story["reason"].startswith("an obstacle was touched"), story["reason"]
 
 # What others know of the end comes first, on the page too.
-story, said = told(good_flight(), 1, "--because", "the battery fell out", *(["--out", "page.html"] if drawn else []))
+story, said = told(good_flight(), 1, "--because", "the battery fell out", "--out", "page.html")
 assert story["reason"] == "the battery fell out" and not story["ok"]
-if drawn:
-    page = open("page.html").read()
-    assert "Not good: the battery fell out" in page and page.count("<svg") >= 3 and "asked to go to" in page
-    assert "the session" not in page, "each call of the station is told twice"
+page = open("page.html").read()
+assert "Not good: the battery fell out" in page and page.count("<svg") >= 3 and "asked to go to" in page
+assert "the session" not in page, "each call of the station is told twice"
 
 # A log in parts: of the first alone the later ones beside it are read, but not a file of another log.
 def part(number, log_id=77):
@@ -233,7 +231,7 @@ log.fly((-0.8, -0.3, -0.8))
 log.record(WORLD, b"the flight is stopped in rougher air: the rest of it is not clear; wall 2.00 times")
 log.record(WORLD, b"snapshot 3 ms after its newest data")
 log.land()
-story, _ = told(log, None, *(["--out", "air.html"] if drawn else []))
+story, _ = told(log, None, "--out", "air.html")
 events = [(round(e["t"], 2), e["what"]) for e in story["events"] if e["kind"] == "air"]
 assert events == [(1.1, "air of class wall: errors have above 2.00 times the variance promised, ln evidence 0.0"),
                   (2.1, "the flight is stopped in rougher air: the rest of it is not clear; wall 2.00 times")], events
@@ -250,17 +248,16 @@ shrunk.land()
 told_of_air = [e["what"] for e in told(shrunk, None)[0]["events"] if e["kind"] == "air"]
 assert told_of_air == ["air of class ground is calmer: errors have below 0.59 times the variance promised",
                        "air of class ground is no longer as calm as shown: its sets are the model's again"], told_of_air
-assert not any(e["kind"] == "air" for e in told(good_flight(), 0, *(["--out", "calm.html"] if drawn else []))[0]["events"])
-if drawn:
-    page, calm = open("air.html").read(), open("calm.html").read()
-    for part in ("<h2>Air</h2>", "<h2>Where the air was rough</h2>", 'class="name">air<'):
-        assert part in page and part not in calm, part
-    data = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
-    columns, rows = next((table["columns"], table["rows"]) for table in data["tables"] if table["id"] == "air")
-    assert columns == ["t_s", "x_m", "y_m", "z_m", "class", "factor_ground", "factor_wall", "evidence_ground", "evidence_wall"], columns
-    first, last = (dict(zip(columns, row)) for row in (rows[0], rows[-1]))
-    assert (first["factor_wall"], first["class"], first["evidence_wall"]) == (1.5, 1, None) and abs(first["evidence_ground"] - 0.5) < 1e-6, first
-    assert (last["factor_wall"], last["class"], last["evidence_wall"]) == (2.0, 2, 1), last
+assert not any(e["kind"] == "air" for e in told(good_flight(), 0, "--out", "calm.html")[0]["events"])
+page, calm = open("air.html").read(), open("calm.html").read()
+for part in ("<h2>Air</h2>", "<h2>Where the air was rough</h2>", 'class="name">air<'):
+    assert part in page and part not in calm, part
+data = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
+columns, rows = next((table["columns"], table["rows"]) for table in data["tables"] if table["id"] == "air")
+assert columns == ["t_s", "x_m", "y_m", "z_m", "class", "factor_ground", "factor_wall", "evidence_ground", "evidence_wall"], columns
+first, last = (dict(zip(columns, row)) for row in (rows[0], rows[-1]))
+assert (first["factor_wall"], first["class"], first["evidence_wall"]) == (1.5, 1, None) and abs(first["evidence_ground"] - 0.5) < 1e-6, first
+assert (last["factor_wall"], last["class"], last["evidence_wall"]) == (2.0, 2, 1), last
 
 # Killed at any byte: all whole records before it are told, and nothing is a defect or bad data.
 log, chance = good_flight(), random.Random(20261123)

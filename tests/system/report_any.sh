@@ -4,13 +4,12 @@
 # take-offs leave, flights that left their sets, decisions that cannot be made again, logs in which nothing was recorded.
 #   report_any.sh BACKWASH
 source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
-command -v gnuplot >/dev/null && drawn=yes || drawn=no
-PYTHONPATH=$here python3 - "$backwash" "$drawn" "$here/../.." <<'PYTHON'
+PYTHONPATH=$here python3 - "$backwash" "$here/../.." <<'PYTHON'
 import json, lzma, pathlib, struct, subprocess, sys
 import raw_log
 from raw_log_maker import *
 
-backwash, drawn, source = sys.argv[1], sys.argv[2] == "yes", pathlib.Path(sys.argv[3])
+backwash, source = sys.argv[1], pathlib.Path(sys.argv[2])
 CUT = source / "tests/data/flights/left_its_set.bwlog.xz"
 WHOLE = source / "../shared/data/field/judged_against_another_set.bwlog.xz"
 
@@ -68,14 +67,14 @@ for name in flown:
         file.write("t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2\n")
         file.writelines(",".join(map(str, [t, *tick[15:21], 0, 0, 0])) + "\n" for t, tick in ticks)
     for truth in ([], ["--truth", "flown.csv"]):
-        page = ["--out", f"{name}.html", "--force"] if drawn else []
+        page = ["--out", f"{name}.html", "--force"]
         ran = subprocess.run([backwash, "report", name, "--json", "--quiet", *truth, *page], capture_output=True, text=True)
         assert ran.returncode == 1 and ran.stderr.count("\n") == 1, ran.stderr
         story = json.loads(ran.stdout)
         judged = [tick[7] for _, tick in ticks if tick[6]]
         assert (story["samples"], story["samples_inside"]) == (len(judged), sum(judged)) and sum(judged) < len(judged), story
         assert "lay outside" in story["reason"] and "was missed by" in story["reason"], story["reason"]
-        assert not drawn or f"{sum(judged)} of {len(judged)}</td>" in open(f"{name}.html").read(), name
+        assert f"{sum(judged)} of {len(judged)}</td>" in open(f"{name}.html").read(), name
 
 # Each decision is made again from what it was made from, where the log has that.
 if WHOLE.is_file():
@@ -84,7 +83,7 @@ if WHOLE.is_file():
 assert "no constants" in told(RawLog(), 1)[0]["replay"]["why_not"]
 
 # What was never recorded is not drawn, and the page says so: no tick, one, none with a set-point.
-for ticks in (0, 1, 200) if drawn else ():
+for ticks in (0, 1, 200):
     log = RawLog()
     log.wait(ticks)
     told(log, 1, "--out", "nothing.html", "--force")

@@ -4,12 +4,11 @@
 # and of scans the raw log holds no voxel. What was flown is written here, so what has to be told is known.
 #   report_maps.sh BACKWASH
 source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
-command -v gnuplot >/dev/null && drawn=yes || drawn=no
-PYTHONPATH=$here python3 - "$backwash" "$drawn" <<'PYTHON'
+PYTHONPATH=$here python3 - "$backwash" <<'PYTHON'
 import json, subprocess, sys
 from raw_log_maker import *
 
-backwash, drawn = sys.argv[1], sys.argv[2] == "yes"
+backwash = sys.argv[1]
 # Cubes of 1.6 m: the one below the origin in x, y and z, and the one beside it, from x = -3.2 to -1.6.
 FREE, BESIDE_FREE, BESIDE_OCCUPIED = 0x40, 0x10, 0x20
 FAR = b"\x00\xc0" + b"\x03\x00" * 10 + b"\x01\x00"  # the cube above the origin alone
@@ -55,15 +54,14 @@ log.record(WORLD, b"window: 12 voxels far from it are let go, 3 of them occupied
 log.record(WORLD, b"window: 8 voxels far from it are let go, 2 of them occupied: the last whole map speaks for them")
 log.fly((-2.4, -0.8, -0.8), ticks=100)
 log.land()
-story, text = told(log, 0, *(["--out", "page.html"] if drawn else []))
+story, text = told(log, 0, "--out", "page.html")
 why = "no whole map had come, and what the mapper's window showed is not in the log"
 assert [(c["map"], c["min_clearance_m"], c["ticks"], c["why_not"]) for c in story["clearances"]] == [(None, None, 100, why)], story["clearances"]
 assert (story["ticks_judged"], story["ticks_not_judged"], story["min_clearance_m"], story["touched"]) == (0, 100, None, False)
 assert story["window"] == {"clouds": 4, "let_go": 20, "let_go_occupied": 5} and story["maps_accepted_s"] == [], story["window"]
 assert f"not judged: {why}" in text and "20 voxels, 5 of them occupied" in text, text
-if drawn:
-    page = open("page.html").read()
-    assert "clearances could not be judged" in page and "nothing touched" not in page and "there was none" in page
+page = open("page.html").read()
+assert "clearances could not be judged" in page and "nothing touched" not in page and "there was none" in page
 
 # One take-off and one route with the truth beside it is `fly`'s flight, but no world can be made of a window.
 open("truth.csv", "w").write("t_s,x_m,y_m,z_m\n" + "".join(f"{1 + 0.02 * k},-2.4,-0.8,-0.8\n" for k in range(log.number)))
@@ -81,7 +79,7 @@ for then, later, touched in ((BESIDE_OCCUPIED, BESIDE_FREE, True), (BESIDE_FREE,
 
 # A whole map and a window: by the map where it knows the place; what it does not know was no obstacle that was touched.
 for seen, name in (({"window": True}, "the mapper's window"), ({"scans": True}, "scans")):
-    story, text = told(outwards(cubes(FREE), **seen), 0, *(["--out", "both.html", "--force"] if drawn else []))
+    story, text = told(outwards(cubes(FREE), **seen), 0, "--out", "both.html", "--force")
     first, second = story["clearances"]
     assert (first["map"], first["why_not"]) == (1, "") and 0 < first["min_clearance_m"] < 0.05, first
     assert second["map"] is None and second["min_clearance_m"] is None, second
@@ -89,10 +87,9 @@ for seen, name in (({"window": True}, "the mapper's window"), ({"scans": True}, 
     assert abs(second["from_s"] - first["until_s"] - 0.02) < 1e-9 and first["ticks"] + second["ticks"] == 100
     assert story["min_clearance_m"] == first["min_clearance_m"] and not story["touched"]
     assert "at least on what was judged of the routes" in text, text
-    if drawn:
-        page = open("both.html").read()
-        assert f"nothing touched where that could be judged, in {first['ticks']} of 100 ticks" in page
-        assert "What clearances were judged by" in page
+    page = open("both.html").read()
+    assert f"nothing touched where that could be judged, in {first['ticks']} of 100 ticks" in page
+    assert "What clearances were judged by" in page
 story, text = told(outwards(cubes(FREE)), 1)
 assert story["touched"] and "unless" not in story["reason"] and "clearances  " not in text, "a map alone is the whole truth"
 

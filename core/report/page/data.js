@@ -19,6 +19,11 @@ function rounded(value) {
   return value.toFixed(size >= 100 ? 0 : size >= 1 ? 2 : 4).replace("-", "−");
 }
 
+// A place along what the plots share.
+function placeOf(t) {
+  return data.along[1] ? `${t.toFixed(2)} ${data.along[1]}` : String(Math.round(t));
+}
+
 function tableOf(id) {
   return data.tables.find((table) => table.id === id);
 }

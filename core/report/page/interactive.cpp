@@ -5,17 +5,14 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/report/page/page.hpp"
 #include "core/report/page/page_files.hpp"
 
 namespace backwash::report {
 namespace {
 
-struct Library {
-  const char *file, *package, *about;
-};
-constexpr Library kPlots{"dygraphs/dygraph.min.js", "libjs-dygraphs",
-                         "dygraphs 2.2, copyright 2006–2023 Dan Vanderkam and other contributors"};
-constexpr Library kThree{"three/three.min.js", "libjs-three", "three.js r111, copyright 2010–2019 three.js authors"};
+const char* const kFile = "three/three.min.js";
+const char* const kAbout = "three.js r111, copyright 2010–2019 three.js authors";
 const char* const kMit =
     "Permission is hereby granted, free of charge, to any person obtaining a copy of this software and associated "
     "documentation files (the \"Software\"), to deal in the Software without restriction, including without limitation "
@@ -27,17 +24,19 @@ const char* const kMit =
     "SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION "
     "OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER "
     "DEALINGS IN THE SOFTWARE.";
-const char* const kCursor =
-    "<div class=\"cursor\"><label for=\"time\">Time</label><input type=\"range\" id=\"time\" min=\"0\" max=\"1\" "
-    "step=\"0.02\" value=\"0\"><output for=\"time\"></output><button type=\"button\" id=\"closer\">Zoom in</button>"
-    "<button type=\"button\" id=\"farther\">Zoom out</button><button type=\"button\" id=\"whole\">Whole flight</button>"
-    "</div>\n";
+/// The cursor of all plots.
+std::string cursor(const PageData& data) {
+  return "<div class=\"cursor\"><label for=\"time\">" + escaped(data.along) +
+         "</label><input type=\"range\" id=\"time\" min=\"0\" max=\"1\" step=\"0.02\" value=\"0\"><output "
+         "for=\"time\"></output><button type=\"button\" id=\"closer\">Zoom in</button><button type=\"button\" "
+         "id=\"farther\">Zoom out</button><button type=\"button\" id=\"whole\">All of it</button></div>\n";
+}
 
-/// The text of a library; empty if no folder holds it.
-std::string found(const Library& library, const std::vector<std::filesystem::path>& folders) {
+/// The text of three.js; empty if no folder holds it.
+std::string found(const std::vector<std::filesystem::path>& folders) {
   for (const auto& folder : folders) {
     std::ostringstream text;
-    if (std::ifstream file(folder / library.file, std::ios::binary); file && text << file.rdbuf()) return text.str();
+    if (std::ifstream file(folder / kFile, std::ios::binary); file && text << file.rdbuf()) return text.str();
   }
   return "";
 }
@@ -64,26 +63,19 @@ std::vector<std::filesystem::path> javascript_folders() {
 Interactive interactive(const PageData& data, const std::vector<std::filesystem::path>& folders) {
   Interactive page;
   page.scripts = "<script type=\"application/json\" id=\"data\">" + to_json(data) + "</script>\n";
-  std::string missing, about;
-  for (const Library* library : {&kPlots, &kThree}) {
-    if (library == &kPlots ? data.plots.empty() : !data.scene) continue;
-    const std::string text = found(*library, folders);
-    if (text.empty()) {
-      missing += (missing.empty() ? "" : " and ") + std::string(library->package);
-      continue;
-    }
-    about += std::string("<p>") + library->about + ".</p>\n";
+  const std::string library = data.scene ? found(folders) : "";
+  if (!library.empty()) {
     page.scripts +=
-        script("/*! " + std::string(library->about) + "; MIT licence, see the end of this page's text */\n" + text);
+        script("/*! " + std::string(kAbout) + "; MIT licence, see the end of this page's text */\n" + library);
+    page.notes += "<details class=\"licence\"><summary>Library in this page</summary>\n<p>" + std::string(kAbout) +
+                  ".</p>\n<p>" + kMit + "</p>\n</details>\n";
+  } else if (data.scene) {
+    page.notes +=
+        "<p class=\"note\">There is no view in three dimensions: install Debian's libjs-three and write this page "
+        "again.</p>\n";
   }
   page.scripts += script(kScript);
-  if (!missing.empty())
-    page.notes += "<p class=\"note\">The figures cannot be moved in: install Debian's " + missing +
-                  " and write this page again.</p>\n";
-  if (!about.empty())
-    page.notes += "<details class=\"licence\"><summary>Libraries in this page</summary>\n" + about + "<p>" + kMit +
-                  "</p>\n</details>\n";
-  if (!data.plots.empty()) page.notes += kCursor;
+  if (!data.plots.empty()) page.notes += cursor(data);
   return page;
 }
 

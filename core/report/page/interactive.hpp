@@ -12,13 +12,13 @@ namespace backwash::report {
 /// Where Debian's packages of JavaScript libraries are: `javascript` below the folders of $XDG_DATA_DIRS.
 std::vector<std::filesystem::path> javascript_folders();
 
-/// What makes a page with drawings one with plots, a scene and files, all of it in the page.
+/// What gives a page's charts zoom and cursor, its scene and its files, all of it in the page.
 struct Interactive {
-  std::string notes;    ///< HTML for the body: the cursor of all plots, or which packages are missing
+  std::string notes;    ///< HTML for the body: the cursor of all plots, or which package is missing
   std::string scripts;  ///< for html_page
 };
-/// dygraphs (libjs-dygraphs) and, where there is a scene, three.js (libjs-three) are copied in from the first folder
-/// that holds them, with their licences; without them the drawings stay, and the notes say what to install.
+/// Where there is a scene, three.js (libjs-three) is copied in from the first folder that holds it, with its licence;
+/// without it the notes say what to install.
 Interactive interactive(const PageData& data, const std::vector<std::filesystem::path>& folders);
 
 }  // namespace backwash::report

@@ -98,6 +98,15 @@ std::string escaped(const std::string& text) {
   return safe;
 }
 
+std::string table(const std::string& rows, bool wide) {
+  return (wide ? "<table class=\"wide\">\n" : "<table>\n") + rows + "</table>\n";
+}
+
+std::string section(const std::string& title, const std::string& words, const std::string& content) {
+  return "<section><h2>" + escaped(title) + "</h2>\n" + (words.empty() ? "" : "<p>" + words + "</p>\n") + content +
+         "</section>\n";
+}
+
 std::string html_page(const std::string& title, const std::string& body, const std::string& scripts) {
   return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
          "content=\"width=device-width, initial-scale=1\">\n<meta http-equiv=\"Content-Security-Policy\" "

@@ -5,10 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
 #include "core/files/base64.hpp"
-#include "core/report/page/figure_parts.hpp"
 #include "core/report/page/page.hpp"
 #include "core/types/text.hpp"
 
@@ -62,7 +60,7 @@ std::string to_json(const TimePlot& p) {
     return object({{"column", script_quoted(c.column)},
                    {"name", script_quoted(c.name)},
                    {"mirrored", c.mirrored ? "true" : "false"},
-                   {"kind", script_quoted(c.kind)}});
+                   {"kind", script_quoted(to_string(c.kind))}});
   };
   return object({{"id", script_quoted(p.id)},
                  {"table", script_quoted(p.table)},
@@ -135,47 +133,50 @@ std::set<std::size_t> envelope(const DataTable& table, std::size_t from, std::si
   return kept;
 }
 
-const char* line_of(const std::string& kind) {
-  if (kind == "flown") return "linewidth 2 linecolor '#0b3d91'";
-  if (kind == "commanded") return "linewidth 1.5 dashtype 2 linecolor '#d1495b'";
-  return kind == "bound" ? "linewidth 1.5 linecolor '#4a8fce'" : "linewidth 1.2 dashtype 2 linecolor '#8a8a8a'";
+std::size_t column_of(const DataTable& table, const Curve& curve) {
+  return static_cast<std::size_t>(std::ranges::find(table.columns, curve.column) - table.columns.begin());
 }
 
 /// Whether the table has a value of it.
 bool has_values(const DataTable& table, const TimePlot& plot) {
   return std::ranges::any_of(plot.curves, [&](const Curve& curve) {
-    const auto column = std::ranges::find(table.columns, curve.column) - table.columns.begin();
-    return std::ranges::any_of(table.rows,
-                               [&](const auto& row) { return !std::isnan(row[static_cast<std::size_t>(column)]); });
+    const std::size_t column = column_of(table, curve);
+    return std::ranges::any_of(table.rows, [&](const auto& row) { return !std::isnan(row[column]); });
   });
 }
 
-}  // namespace
-
-Figure plots_figure(const DataTable& table, const std::vector<TimePlot>& plots) {
-  std::ostringstream script;
-  script << "$rows << EOD\n";
+/// Its stretches without a gap.
+std::vector<Run> runs_of(const DataTable& table, const Curve& curve, double sign) {
+  const std::size_t column = column_of(table, curve);
+  std::vector<Run> runs(1);
   for (const auto& row : table.rows) {
-    for (const double value : row) std::isnan(value) ? script << "NaN " : script << value << ' ';
-    script << '\n';
-  }
-  script << "EOD\n"
-         << kAxes << "set lmargin 10\nset key outside top center horizontal\nset multiplot layout " << plots.size()
-         << ",1\n";
-  for (const auto& plot : plots) {
-    if (&plot == &plots.back()) script << "set xlabel 'time, s'\n";
-    script << "set ylabel " << gnuplot_quoted(plot.name + ", " + plot.unit) << "\nplot ";
-    for (const auto& curve : plot.curves) {
-      const auto column = std::ranges::find(table.columns, curve.column) - table.columns.begin() + 1;
-      if (curve.mirrored)
-        script << "$rows using 1:(-$" << column << ") with lines " << line_of(curve.kind) << " notitle, ";
-      script << "$rows using 1:" << column << " with lines " << line_of(curve.kind) << " title "
-             << gnuplot_quoted(curve.name) << (&curve == &plot.curves.back() ? "\n" : ", ");
+    if (std::isnan(row[column])) {
+      if (!runs.back().empty()) runs.emplace_back();
+    } else {
+      runs.back().push_back({row[0], sign * row[column]});
     }
   }
-  script << "unset multiplot\n";
-  return draw(script.str(), Format::svg, 1000, 60 + 220 * static_cast<int>(plots.size()));
+  return runs;
 }
+
+Chart chart_of(const DataTable& table, const TimePlot& plot, const std::string& along) {
+  Chart chart{.x = {.name = along}, .y = {.name = plot.name + ", " + plot.unit}, .plot = plot.id};
+  if (!table.rows.empty()) chart.x = {along, table.rows.front()[0], table.rows.back()[0]};
+  for (const auto& curve : plot.curves) {
+    const auto runs = runs_of(table, curve, 1);
+    auto below = runs_of(table, curve, -1);
+    if (curve.mirrored && curve.kind == Kind::bound) {
+      auto band = runs;
+      for (std::size_t n = 0; n < band.size(); ++n) band[n].insert(band[n].end(), below[n].rbegin(), below[n].rend());
+      chart.layers.insert(chart.layers.begin(), {Shape::area, Kind::band, "", std::move(band)});
+    }
+    if (curve.mirrored) chart.layers.push_back({curve.shape, curve.kind, "", std::move(below)});
+    chart.layers.push_back({curve.shape, curve.kind, curve.name, runs});
+  }
+  return chart;
+}
+
+}  // namespace
 
 DataTable thinned(DataTable table, std::size_t most) {
   if (table.rows.size() <= most) return table;
@@ -205,12 +206,24 @@ std::vector<Prism> at_intervals(const std::vector<Prism>& tube, double step, std
   return kept;
 }
 
+std::string files_html(const std::vector<std::string>& tables) {
+  std::string names;
+  for (const auto& table : tables) names += (names.empty() ? "" : " ") + table;
+  return "<p class=\"files\" data-tables=\"" + escaped(names) + "\"></p>\n";
+}
+
 std::string to_html(const Section& section) {
-  std::string html = "<section><h2>" + section.title + "</h2>\n<p>" + section.text + "</p>\n" + *section.drawing + "\n";
-  for (const auto& plot : section.plots) html += "<div class=\"plot\" data-plot=\"" + escaped(plot.id) + "\"></div>\n";
-  std::string tables;
-  for (const auto& table : section.tables) tables += (tables.empty() ? "" : " ") + table;
-  return html + "<p class=\"files\" data-tables=\"" + escaped(tables) + "\"></p>\n</section>\n";
+  return report::section(section.title, section.text, section.drawing + files_html(section.tables));
+}
+
+std::string plotted(PageData& data, const DataTable& table, const std::vector<TimePlot>& plots) {
+  std::string html;
+  for (const auto& plot : plots)
+    html += to_svg(chart_of(table, plot, data.along + (data.along_unit.empty() ? "" : ", " + data.along_unit))) + "\n";
+  data.plots.insert(data.plots.end(), plots.begin(), plots.end());
+  if (!table.rows.empty() && std::ranges::find(data.tables, table.id, &DataTable::id) == data.tables.end())
+    data.tables.push_back(table);
+  return html;
 }
 
 void add_plots(std::vector<Section>& sections, PageData& data, DataTable table, const std::string& title,
@@ -221,13 +234,25 @@ void add_plots(std::vector<Section>& sections, PageData& data, DataTable table, 
     without += (without.empty() ? "" : ", ") + plot.name;
     return true;
   });
-  const std::string said =
-      without.empty() ? text : text + " Not drawn, because the log has no value of it: " + without + ".";
-  sections.push_back({title, said, plots.empty() ? Figure("") : plots_figure(table, plots), plots, {}});
-  data.plots.insert(data.plots.end(), plots.begin(), plots.end());
-  if (table.rows.empty()) return;
-  sections.back().tables.push_back(table.id);
-  data.tables.push_back(std::move(table));
+  if (!without.empty()) without = " Not drawn, because the log has no value of it: " + without + ".";
+  sections.push_back({title, text + without, plotted(data, table, plots), {}});
+  if (!table.rows.empty()) sections.back().tables.push_back(table.id);
+}
+
+std::vector<Vec3> octagon(const PerDirection& h) {
+  std::vector<Vec3> corners = {{h[kX], -h[kY], 0}, {h[kX], h[kY], 0}, {-h[kX], h[kY], 0}, {-h[kX], -h[kY], 0}};
+  for (const auto& [d, sign] : {std::pair{kXyPlus, 1.0}, {kXyPlus, -1.0}, {kXyMinus, 1.0}, {kXyMinus, -1.0}}) {
+    const Vec3 n = sign * unit(d);
+    std::vector<Vec3> kept;
+    for (std::size_t i = 0; i < corners.size(); ++i) {  // Sutherland and Hodgman's clip at n·e = h
+      const Vec3 &from = corners[i], &to = corners[(i + 1) % corners.size()];
+      const double a = n.dot(from) - h[d], b = n.dot(to) - h[d];
+      if (a <= 0) kept.push_back(from);
+      if ((a < 0 && b > 0) || (a > 0 && b < 0)) kept.push_back(from + a / (a - b) * (to - from));
+    }
+    corners = std::move(kept);
+  }
+  return corners;
 }
 
 std::string script_quoted(const std::string& text) {
@@ -240,6 +265,7 @@ std::string to_json(const PageData& data) {
   const auto any = [](const auto& thing) { return to_json(thing); };
   return object({{"tables", list(data.tables, any)},
                  {"plots", list(data.plots, any)},
+                 {"along", array({script_quoted(data.along), script_quoted(data.along_unit)})},
                  {"modes", list(data.modes, any)},
                  {"scene", data.scene ? to_json(*data.scene) : "null"},
                  {"field", data.field ? to_json(*data.field) : "null"}});

@@ -8,7 +8,7 @@
 
 #include "core/report/field_box.hpp"
 #include "core/report/map_faces.hpp"
-#include "core/report/page/figures.hpp"
+#include "core/report/page/chart.hpp"
 
 namespace backwash::report {
 
@@ -31,23 +31,23 @@ DataTable thinned(DataTable table, std::size_t most = 4000);
 /// A column of a table as a curve over the table's first one.
 struct Curve {
   std::string column, name;
-  const char* kind;       ///< flown, commanded, bound, paper: its colour and dashes
+  Kind kind;
   bool mirrored = false;  ///< its negative, too; of a bound, with what lies between
+  Shape shape = Shape::line;
 };
 struct TimePlot {
   std::string id, table, name, unit;
   std::vector<Curve> curves;
 };
 
-/// A part of a page: a drawing that is always there, and what takes its place where scripts run.
+/// A part of a page.
 struct Section {
-  std::string title, text;  ///< HTML
-  Figure drawing;
-  std::vector<TimePlot> plots;
-  std::vector<std::string> tables;  ///< ids, to be had as files
+  std::string title, text, drawing;  ///< HTML
+  std::vector<std::string> tables;   ///< ids, to be had as files
 };
-/// Precondition: it has a drawing.
 std::string to_html(const Section& section);
+/// Where the script puts the buttons that give tables as files.
+std::string files_html(const std::vector<std::string>& tables);
 
 /// A set predicted for some moment: |unit(d)·(p − center)| ≤ half_widths[d].
 struct Prism {
@@ -73,16 +73,16 @@ struct ModeSpan {
 struct PageData {
   std::vector<DataTable> tables;
   std::vector<TimePlot> plots;
+  std::string along = "time", along_unit = "s";  ///< what the cursor of all plots moves along
   std::vector<ModeSpan> modes;
   std::optional<Scene> scene;
   std::optional<FieldBox> field;  ///< the page makes the table "field" of its layer
 };
 
-/// Plots of a table over its first column, below each other, drawn by gnuplot.
-Figure plots_figure(const DataTable& table, const std::vector<TimePlot>& plots);
+/// Adds plots of a table over its first column, below each other, to `data`, with the table; what draws them.
+std::string plotted(PageData& data, const DataTable& table, const std::vector<TimePlot>& plots);
 
-/// Adds a section of plots below each other, drawn by gnuplot, and to `data` its table and plots. A plot that the table
-/// has no value for is none, and the section says so.
+/// Adds a section of such plots. A plot that the table has no value for is none, and the section says so.
 void add_plots(std::vector<Section>& sections, PageData& data, DataTable table, const std::string& title,
                const std::string& text, std::vector<TimePlot> plots);
 
@@ -93,5 +93,7 @@ std::string script_quoted(const std::string& text);
 std::string to_json(const PageData& data);
 /// The section that the scene is drawn in; it has no static drawing.
 std::string scene_html(const Scene& scene);
+/// Corners of {e : |unit(d)·e| ≤ h_d} seen from above, relative to its centre, counter-clockwise, m.
+std::vector<Vec3> octagon(const PerDirection& half_widths);
 
 }  // namespace backwash::report

@@ -1,6 +1,7 @@
 // Files, timeline and cursor; then all of it begins.
 function csvOf(table) {
-  return [table.columns.join(","), ...table.rows.map((row) => row.map((value) => value === null ? "" : String(value)).join(","))].join("\n") + "\n";
+  const quoted = (name) => name.includes(",") ? `"${name}"` : name;
+  return [table.columns.map(quoted).join(","), ...table.rows.map((row) => row.map((value) => value === null ? "" : String(value)).join(","))].join("\n") + "\n";
 }
 
 function giveFile(name, text) {
@@ -54,21 +55,21 @@ function makeCursor() {
   Object.assign(slider, {min: from, max: until});
   cursor.shown.push((t) => {
     slider.value = t;
-    told.textContent = `${t.toFixed(2)} s${modeAt(t)}`;
+    told.textContent = placeOf(t) + modeAt(t);
     slider.setAttribute("aria-valuetext", told.textContent);
   });
   slider.oninput = () => setCursor(+slider.value);
   bar.querySelector("#closer").onclick = () => zoomBy(0.5);
   bar.querySelector("#farther").onclick = () => zoomBy(2);
-  bar.querySelector("#whole").onclick = () => setWindow(wholeTime());
+  bar.querySelector("#whole").onclick = () => setWindow(...wholeTime());
 }
 
 makeFiles();
 makeTimeline();
-makePlots();
+makeCharts();
 makeScene();
 makeCursor();
-if (data.plots.length) {
+if (plots.length) {
   const [from, until] = wholeTime();
   setCursor(Math.max(from, Math.min(0.5 * (Math.max(from, 0) + until), until)));
 }

@@ -1,26 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "core/map/occupancy_grid.hpp"
-#include "core/report/page/plot.hpp"
+#include "core/report/page/chart.hpp"
 #include "core/study/calibrate/fit.hpp"
 
 namespace backwash::study::calibrate {
 
-/// One map of a figure.
-struct FigurePlace {
-  std::string name;
-  const map::OccupancyGrid* grid;
-  std::size_t place;  ///< its number in Data::place
-};
-
-/// Raw variances of the windows along a world axis (red points) under the bound (surface) over y and height, one panel
-/// per map (the paper's hover figure). The surface lies in the plane of the hovers' mean x, across their range.
-/// gnuplot; SVG. A field evaluation per 0.1 × 0.1 m.
-tl::expected<std::string, report::PlotError> bound_figure(const Data& data, const Model& model, int axis,
-                                                          std::span<const FigurePlace> places);
+/// Raw variances of the windows of one map along a world axis (dots) and the bound (lines) over y, for the lowest, the
+/// middle and the highest third of the hovers (the paper's hover figure). A line is the bound at its third's mean x and
+/// height. A field evaluation per 0.1 m and line.
+report::Chart bound_chart(const Data& data, const Model& model, int axis, const map::OccupancyGrid& grid,
+                          std::size_t place);
 
 }  // namespace backwash::study::calibrate

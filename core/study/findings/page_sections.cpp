@@ -2,7 +2,6 @@
 #include "core/study/findings/page_sections.hpp"
 
 #include <cstdio>
-#include <sstream>
 
 #include "core/report/page/page.hpp"
 #include "core/study/findings/study.hpp"
@@ -35,10 +34,6 @@ std::string number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
   return text;
-}
-
-std::string row(const std::string& name, const std::string& value) {
-  return "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(value) + "</td></tr>\n";
 }
 
 std::string too_few(const Observations& seen) {
@@ -77,26 +72,35 @@ std::string rotor_sentence(const RotorVerdict& v) {
   }
 }
 
-tl::expected<std::string, report::PlotError> rotor_section(const RotorVerdict& v) {
-  std::ostringstream script;
-  script << "$each << EOD\n";
-  for (std::size_t r = 0; r < v.each.size(); ++r)
-    script << r + 1 << ' ' << 100 * v.each[r].d << ' ' << 100 * v.each[r].low << ' ' << 100 * v.each[r].high << '\n';
-  script << "EOD\nset xrange [0.5:4.5]\nset xtics ('rotor 1' 1, 'rotor 2' 2, 'rotor 3' 3, 'rotor 4' 4)\n"
-         << "set ylabel 'command needed more, %'\nset grid y\nset key outside top center horizontal\nset xzeroaxis lt "
-            "1 lc rgb '#888888'\n"
-         << "plot " << 100 * v.minimum << " with lines dt 2 lw 2 lc rgb '#c0561d' title 'named four times in five', "
-         << "$each using 1:2:3:4 with yerrorbars lw 2 pt 7 lc rgb '#1f6f9f' title 'if this rotor alone, 95 %'\n";
-  auto drawn = report::draw(script.str(), report::Format::svg, 860, 300);
-  if (!drawn) return drawn;
-  return "<section><h2>Rotors against sound flights</h2>\n<p>" + report::escaped(rotor_sentence(v)) + "</p>\n" +
-         *drawn + "<table>\n" +
-         row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
-         row("Smallest that is named with 80 % power", percent(v.minimum)) +
-         row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
-         row("Twist, which a weight does not give, t", number(v.t_yaw)) +
-         row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b)) +
-         "</table>\n</section>\n";
+std::string rotor_section(const RotorVerdict& v, report::PageData& data) {
+  using enum report::Kind;
+  using enum report::Shape;
+  report::DataTable table{"rotors", {"rotor", "percent", "percent_low", "percent_high"}, {}, 0};
+  report::Layer most{dots, after, "if this rotor alone, 95 %", {{}}}, bars{line, after, "", {}};
+  for (std::size_t r = 0; r < v.each.size(); ++r) {
+    const auto& e = v.each[r];
+    const auto at = static_cast<double>(r) + 1;
+    table.rows.push_back({at, 100 * e.d, 100 * e.low, 100 * e.high});
+    most.runs[0].push_back({at, 100 * e.d});
+    bars.runs.push_back({{at, 100 * e.low}, {at, 100 * e.high}});
+  }
+  data.tables.push_back(std::move(table));
+  const auto level = [](double y) { return report::Run{{0.5, y}, {4.5, y}}; };
+  const report::Chart chart{.x = {"", 0.5, 4.5, false, {"rotor 1", "rotor 2", "rotor 3", "rotor 4"}},
+                            .y = {"command needed more, %"},
+                            .layers = {{line, measured, "", {level(0)}},
+                                       {line, commanded, "named four times in five", {level(100 * v.minimum)}},
+                                       std::move(bars),
+                                       std::move(most)},
+                            .height = 300};
+  return report::section(
+      "Rotors against sound flights", report::escaped(rotor_sentence(v)),
+      report::to_svg(chart) + report::files_html({"rotors"}) +
+          report::table(row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
+                        row("Smallest that is named with 80 % power", percent(v.minimum)) +
+                        row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
+                        row("Twist, which a weight does not give, t", number(v.t_yaw)) +
+                        row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b))));
 }
 
 std::string height_sentence(const calibrate::HeightEffects& effects) {
@@ -113,13 +117,9 @@ std::string height_sentence(const calibrate::HeightEffects& effects) {
 std::string height_section(const calibrate::HeightEffects& effects) {
   const auto& all = effects.all;
   const auto& slow = effects.hovers;
-  std::string text =
-      "<section><h2>Vertical variance by height and plate</h2>\n<p>Day and speed held fixed, flights random, 95 % "
-      "intervals by resampling flights. The variance of a pass holds its own acceleration: the hovers alone do "
-      "not.</p>\n<table>\n<tr><th></th><td><b>hovers and passes</b></td><td><b>hovers</b></td></tr>\n";
+  std::string text = report::heads("", "hovers and passes", "hovers");
   const auto line = [&](const std::string& name, auto value) {
-    text += "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(value(all)) + "</td><td>" +
-            report::escaped(slow ? value(*slow) : "none") + "</td></tr>\n";
+    text += row(name, value(all), slow ? value(*slow) : std::string("none"));
   };
   const std::string contrast = number(all.low_m) + " m over the surface against " + number(all.high_m) + " m";
   line(contrast + ", by a law of height", [](auto& h) { return ratio(h.low_over_high); });
@@ -131,7 +131,10 @@ std::string height_section(const calibrate::HeightEffects& effects) {
     return std::to_string(h.windows) + " windows of " + std::to_string(h.flights) + " flights on " +
            std::to_string(h.days) + " days";
   });
-  return text + "</table>\n</section>\n";
+  return report::section("Vertical variance by height and plate",
+                         "Day and speed held fixed, flights random, 95 % intervals by resampling flights. The variance "
+                         "of a pass holds its own acceleration: the hovers alone do not.",
+                         report::table(text));
 }
 
 }  // namespace backwash::study

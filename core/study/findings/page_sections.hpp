@@ -3,7 +3,8 @@
 
 #include <string>
 
-#include "core/report/page/plot.hpp"
+#include "core/report/page/page.hpp"
+#include "core/report/page/page_data.hpp"
 #include "core/study/calibrate/height_effect.hpp"
 #include "core/study/inference/rotors/rotor_reference.hpp"
 #include "core/study/windows/observation.hpp"
@@ -14,17 +15,16 @@ namespace backwash::study {
 std::string spoken(std::string name);
 /// Three digits.
 std::string number(double value);
-/// A row of a two-column table; escapes both.
-std::string row(const std::string& name, const std::string& value);
+using report::row;
 
 /// Why no cause is named: how many flights (or groups of them) have good windows, how many are needed, and what was
 /// left out of the others.
 std::string too_few(const Observations& seen);
 
 /// What the motor shares say against those of sound flights, in a sentence, and as a section of the page: what every
-/// rotor would need more, beside the smallest need that would be named. Error: the figure could not be drawn.
+/// rotor would need more, beside the smallest need that would be named; its table comes into `data`.
 std::string rotor_sentence(const RotorVerdict& verdict);
-tl::expected<std::string, report::PlotError> rotor_section(const RotorVerdict& verdict);
+std::string rotor_section(const RotorVerdict& verdict, report::PageData& data);
 
 /// Ratios of the vertical variance by height and plate, of all windows and of hovers alone; and, in a sentence, those
 /// of the hovers that differ from 1 (empty if none does).

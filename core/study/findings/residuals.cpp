@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/findings/residuals.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <optional>
-#include <sstream>
 
 #include "core/report/page/page.hpp"
 #include "core/study/findings/page_sections.hpp"
@@ -42,21 +42,22 @@ bool both(const Observations& measured, const Told& told, Channel c, std::size_t
 }
 
 /// Measured as dots, simulated as lines.
-tl::expected<std::string, report::PlotError> picture(const Observations& measured, const Told& before,
-                                                     const Told& after, Channel c) {
-  std::ostringstream rows;
-  for (std::size_t i = 0; i < measured.windows.size(); ++i) {
-    if (!both(measured, before, c, i) || !both(measured, after, c, i)) continue;
-    rows << i << ' ' << measured.y[c][i] << ' ' << *before[c][i] << ' ' << *after[c][i] << '\n';
-  }
-  std::ostringstream script;
-  script << "$rows << EOD\n"
-         << rows.str() << "EOD\nset xlabel 'window, in the order of the flights'\nset ylabel '" << channel_name(c)
-         << (c <= kMeanZ ? ", m/s²" : "") << "'\nset key outside top center horizontal\nset grid\n"
-         << "plot $rows using 1:2 with points pt 7 ps 0.25 lc rgb '#888888' title 'measured', "
-         << "$rows using 1:3 with lines lw 1 lc rgb '#c0561d' title 'simulated before', "
-         << "$rows using 1:4 with lines lw 1 lc rgb '#1f6f9f' title 'simulated after'\n";
-  return report::draw(script.str(), report::Format::svg, 860, 260);
+std::string picture(const Observations& measured, const Told& before, const Told& after, Channel c,
+                    report::PageData& data) {
+  std::string id = channel_name(c);
+  std::ranges::replace(id, ' ', '_');
+  report::DataTable table{id, {"window", "measured", "before", "after"}, {}, 0};
+  for (std::size_t i = 0; i < measured.windows.size(); ++i)
+    if (both(measured, before, c, i) && both(measured, after, c, i))
+      table.rows.push_back({static_cast<double>(i), measured.y[c][i], *before[c][i], *after[c][i]});
+  const report::TimePlot plot{id,
+                              id,
+                              channel_name(c),
+                              c <= kMeanZ ? "m/s²" : "ln",
+                              {{"measured", "measured", report::Kind::measured, false, report::Shape::dots},
+                               {"before", "simulated before", report::Kind::before},
+                               {"after", "simulated after", report::Kind::after}}};
+  return report::plotted(data, table, {plot}) + report::files_html({id});
 }
 
 }  // namespace
@@ -104,23 +105,24 @@ std::optional<ChannelError> channel_error(const Observations& measured, const To
   return ChannelError{std::sqrt(std::max(0.0, square / weight - (about_mean ? mean * mean : 0.0))), windows};
 }
 
-tl::expected<std::string, report::PlotError> residual_section(const Observations& measured, const Told& before,
-                                                              const Told& after) {
-  std::string text =
-      "<section><h2>Simulated beside measured</h2>\n<p>The set-points of these flights, flown by the simulation in the "
-      "air of the model, before the extension and after it; the mean of several flights with other gusts. Errors are "
-      "root mean squares over windows of 2 s.</p>\n";
-  std::string table = "<table>\n", pictures;
+std::string residual_section(const Observations& measured, const Told& before, const Told& after,
+                             report::PageData& data) {
+  data.along = "window, in the order of the flights";
+  data.along_unit = "";
+  std::string rows, pictures;
   for (std::size_t k = 0; k < kChannels; ++k) {
     const auto c = static_cast<Channel>(k);
     const auto b = channel_error(measured, before, c), a = channel_error(measured, after, c);
     if (!b || !a || static_cast<double>(b->windows) < kRules.fewest_compared) continue;
-    table += row(channel_name(c), number(b->value) + " → " + number(a->value));
-    auto drawn = picture(measured, before, after, c);
-    if (!drawn) return drawn;
-    pictures += *drawn;
+    rows += row(channel_name(c), number(b->value) + " → " + number(a->value));
+    pictures += picture(measured, before, after, c, data);
   }
-  return text + table + "</table>\n" + pictures + "</section>\n";
+  return report::section(
+      "Simulated beside measured",
+      "The set-points of these flights, flown by the simulation in the air of the model, before the extension and "
+      "after "
+      "it; the mean of several flights with other gusts. Errors are root mean squares over windows of 2 s.",
+      report::table(rows) + pictures);
 }
 
 }  // namespace backwash::study

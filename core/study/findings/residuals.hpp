@@ -8,7 +8,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "core/report/page/plot.hpp"
+#include "core/report/page/page_data.hpp"
 #include "core/study/windows/observation.hpp"
 
 /// What a simulation says of measured flights whose set-points it flew, window by window.
@@ -30,8 +30,8 @@ std::optional<ChannelError> channel_error(const Observations& measured, const To
                                           bool about_mean = false);
 
 /// A section of the page: per channel what was measured and what was simulated before and after, in the flights' order,
-/// with both errors. Error: a figure that could not be drawn.
-tl::expected<std::string, report::PlotError> residual_section(const Observations& measured, const Told& before,
-                                                              const Told& after);
+/// with both errors; its tables and plots come into `data`.
+std::string residual_section(const Observations& measured, const Told& before, const Told& after,
+                             report::PageData& data);
 
 }  // namespace backwash::study

@@ -60,17 +60,19 @@ const SelfTest& self_test() {
 
 std::string self_test_section(const std::vector<std::string>& names) {
   const SelfTest& test = self_test();
-  std::string text = "<section><h2>How often the method is right</h2>\n<p>" + std::to_string(test.flights) +
-                     " made flights each, by a generator with other formulas, effects of the size of the table in "
-                     "docs/measurements/confusion.md, seed " +
-                     std::to_string(test.seed) + ".</p>\n<table>\n";
+  std::string here, all;
   for (const auto& name : names)
-    if (const auto* r = test.of(name)) text += shown(*r);
+    if (const auto* r = test.of(name)) here += shown(*r);
   for (const Hidden hidden : {Hidden::nothing, Hidden::structure})
-    if (const auto* r = test.of(hidden)) text += shown(*r);
-  text += "</table>\n<details><summary>Every cause</summary>\n<table>\n";
-  for (const auto& r : test.rows) text += shown(r);
-  return text + "</table>\n</details>\n</section>\n";
+    if (const auto* r = test.of(hidden)) here += shown(*r);
+  for (const auto& r : test.rows) all += shown(r);
+  return report::section(
+      "How often the method is right",
+      std::to_string(test.flights) +
+          " made flights each, by a generator with other formulas, effects of the size of the table "
+          "in docs/measurements/confusion.md, seed " +
+          std::to_string(test.seed) + ".",
+      report::table(here) + "<details><summary>Every cause</summary>\n" + report::table(all) + "</details>\n");
 }
 
 }  // namespace backwash::study

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <sstream>
 
+#include "core/report/page/interactive.hpp"
 #include "core/report/page/page.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/self_test.hpp"
@@ -81,16 +81,14 @@ Regressor flight_by_flight(const Observations& seen) {
           [longest](const WindowRow& w) { return static_cast<double>(w.flight) + 1 + w.t / longest[w.flight]; }};
 }
 
-/// Residual of the cause's first channel against its variable, before and after, with means of twelve groups.
-tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, const Observations& seen) {
+/// Residual of the cause's first channel against its variable, before and after, with means of twelve groups; `data`
+/// gets its table.
+std::string picture(const NamedCause& cause, const Observations& seen, report::PageData& data) {
   const auto& found = cause.found;
   const Channel channel = found.columns.front().parts.front().channel;
   const Regressor own = found.form->effect->axis;
   const Regressor along = cause.flights.empty() && varies(own, seen) ? own : flight_by_flight(seen);
-  struct Point {
-    double x, before, after;
-  };
-  std::vector<Point> points;
+  report::DataTable points{found.form->cause(), {along.name, "before", "after"}, {}, 0};
   for (std::size_t i = 0; i < seen.windows.size(); ++i) {
     const double x = along.value(seen.windows[i]);
     if (!std::isfinite(x)) continue;
@@ -101,33 +99,32 @@ tl::expected<std::string, report::PlotError> picture(const NamedCause& cause, co
           added[part.channel == kMeanY ? 1 : 0] += found.theta[static_cast<Eigen::Index>(k)] * part.x[i];
     const auto& w = seen.windows[i];
     const auto before = shown(*found.form->effect, w, seen, i, channel, {});
-    if (before) points.push_back({x, *before, *shown(*found.form->effect, w, seen, i, channel, added)});
+    if (before) points.rows.push_back({x, *before, *shown(*found.form->effect, w, seen, i, channel, added)});
   }
-  std::sort(points.begin(), points.end(), [](auto& a, auto& b) { return a.x < b.x; });
-  std::ostringstream script, dots, lines;
-  for (const auto& p : points) dots << p.x << ' ' << p.before << ' ' << p.after << '\n';
-  const std::size_t groups = std::min(static_cast<std::size_t>(kRules.picture_groups), points.size());
-  for (std::size_t g = 0; g < groups; ++g) {
-    const std::size_t a = g * points.size() / groups, b = (g + 1) * points.size() / groups;
-    Point mean{0, 0, 0};
-    for (std::size_t i = a; i < b; ++i) {
-      const double n = static_cast<double>(b - a);
-      mean.x += points[i].x / n;
-      mean.before += points[i].before / n;
-      mean.after += points[i].after / n;
+  std::ranges::sort(points.rows, {}, [](auto& row) { return row[0]; });
+  std::array<report::Run, 2> clouds, means;
+  const std::size_t all = points.rows.size(), groups = std::min(static_cast<std::size_t>(kRules.picture_groups), all);
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (const auto& row : points.rows) clouds[k].push_back({row[0], row[1 + k]});
+    for (std::size_t g = 0; g < groups; ++g) {
+      const std::size_t from = g * all / groups, until = (g + 1) * all / groups;
+      report::Place sum = report::Place::Zero();
+      for (std::size_t i = from; i < until; ++i) sum += clouds[k][i];
+      means[k].push_back(sum / static_cast<double>(until - from));
     }
-    lines << mean.x << ' ' << mean.before << ' ' << mean.after << '\n';
   }
-  script << "$dots << EOD\n"
-         << dots.str() << "EOD\n$lines << EOD\n"
-         << lines.str() << "EOD\nset xlabel '" << along.name << "'\nset ylabel 'missed: "
-         << (found.form->effect->towards_walls ? "mean towards that wall" : channel_name(channel))
-         << (channel <= kMeanZ ? ", m/s²" : "") << "'\nset key top right\nset grid\n"
-         << "plot $dots using 1:2 with points pt 7 ps 0.25 lc rgb '#c9b8a8' notitle, "
-         << "$dots using 1:3 with points pt 7 ps 0.25 lc rgb '#a8bccc' notitle, "
-         << "$lines using 1:2 with linespoints lw 3 pt 7 lc rgb '#c0561d' title 'before', "
-         << "$lines using 1:3 with linespoints lw 3 pt 7 lc rgb '#1f6f9f' title 'after'\n";
-  return report::draw(script.str(), report::Format::svg, 860, 380);
+  data.tables.push_back(std::move(points));
+  using enum report::Kind;
+  using enum report::Shape;
+  const std::string what = found.form->effect->towards_walls ? "mean towards that wall" : channel_name(channel);
+  return report::to_svg({.x = {along.name},
+                         .y = {"missed: " + what + (channel <= kMeanZ ? ", m/s²" : "")},
+                         .layers = {{dots, before, "", {clouds[0]}},
+                                    {dots, after, "", {clouds[1]}},
+                                    {line, before, "before", {means[0]}},
+                                    {line, after, "after", {means[1]}}},
+                         .height = 380}) +
+         report::files_html({found.form->cause()});
 }
 
 /// In which flights it acts, by number and by log.
@@ -141,7 +138,7 @@ std::string acting_rows(const NamedCause& cause, const std::vector<std::string>&
 
 std::string figures(const NamedCause& cause, const PageContext& context) {
   const auto& g = cause.gain;
-  std::string text = "<table>\n" + acting_rows(cause, context.logs);
+  std::string text = acting_rows(cause, context.logs);
   if (context.read_vehicle) text += row("What to change", remedy_of(cause, *context.read_vehicle).words);
   for (const auto& e : cause.found.parameters)
     text += row(spoken(e.name), number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
@@ -166,7 +163,7 @@ std::string figures(const NamedCause& cause, const PageContext& context) {
     text += row("Not told from " + spoken(s.rival),
                 "fly next: " + s.manoeuvre +
                     (s.expected_nats ? " (" + number(*s.expected_nats) + " nats expected from 12 flights)" : ""));
-  return text + "</table>\n";
+  return report::table(text);
 }
 
 std::string share(double value) { return number(100 * value) + " %"; }
@@ -180,12 +177,9 @@ std::string plan_text(const FlightOutcome& o) {
 /// What field, reach and plan make of the causes.
 std::string consequence_section(const Consequence& c) {
   const FlightOutcome &b = c.before, &a = c.after;
-  std::string text =
-      "<section><h2>What it changes for a flight</h2>\n<table>\n<tr><th></th><td style=\"width:22%\"><b>before</b></td>"
-      "<td><b>after</b></td></tr>\n";
+  std::string text = report::heads("", "before", "after");
   const auto line = [&](const std::string& name, const std::string& before, const std::string& after) {
-    text += "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(before) + "</td><td>" +
-            report::escaped(after) + "</td></tr>\n";
+    text += row(name, before, after);
   };
   line("Measured samples inside the bound, flights not fitted", share(b.inside), share(a.inside));
   using Sizes = FlightOutcome::HoverSizes;
@@ -202,59 +196,62 @@ std::string consequence_section(const Consequence& c) {
     const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };
     line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text(b), plan_text(a));
   }
-  return text + "</table>\n<p>" + report::escaped(cost_sentence(c)) + "</p>\n</section>\n";
+  return report::section("What it changes for a flight", report::escaped(cost_sentence(c)), report::table(text));
 }
 
 /// Whether what the accepted causes leave depends on something.
 std::string remaining_section(const std::vector<Dependence>& all, bool counted) {
   if (all.empty()) return "";
-  std::string text = "<section><h2>What remains</h2>\n";
+  constexpr const char* kTitle = "What remains";
   if (!all.front().found)
-    return text + "<p>No dependence left was found (smallest corrected p " + number(all.front().p_holm) + " of " +
-           std::to_string(all.size()) + " tested).</p>\n</section>\n";
-  text += std::string("<p>What remains depends on the following") +
-          (counted ? "." : "; beside a cause the verdict does not count it.") + "</p>\n<table>\n";
+    return report::section(kTitle,
+                           "No dependence left was found (smallest corrected p " + number(all.front().p_holm) + " of " +
+                               std::to_string(all.size()) + " tested).",
+                           "");
+  std::string text;
   for (const auto& d : all)
     if (d.found) text += row(d.group + " on " + d.regressor, "p " + number(d.p_holm) + ", corrected (Holm)");
-  return text + "</table>\n</section>\n";
+  return report::section(kTitle,
+                         std::string("What remains depends on the following") +
+                             (counted ? "." : "; beside a cause the verdict does not count it."),
+                         report::table(text));
 }
 
 std::string unknown_section(const std::vector<UnknownStructure>& unknown) {
   if (unknown.empty()) return "";
-  std::string text = "<section><h2>Without a name</h2>\n<table>\n";
+  std::string text;
   for (const auto& u : unknown)
     text += row(u.group + " along " + u.along + " (" + u.shape + ")",
                 "p " + number(u.p) + (u.gain ? ", " + number(*u.gain) + " nats held out" : ""));
-  return text + "</table>\n</section>\n";
+  return report::section("Without a name", "", report::table(text));
 }
 
 /// What was not tested, what would not have been found, which windows were left out.
 std::string limits_sections(const StudyResult& result, const Observations& seen) {
-  std::string page = "<section><h2>What was not tested, and why</h2>\n<table>\n";
-  for (const auto& [name, why] : result.not_tested) page += row(spoken(name), why);
-  for (const auto& r : result.refused) page += row("Refused: " + spoken(r.name), refusal(r));
-  if (result.not_tested.empty()) page += row("Everything in the catalogue was tested", "");
-  page +=
-      "</table>\n</section>\n<section><h2>Smallest effects that these flights would show</h2>\n"
-      "<p>Found with 80 % power, by injection into these flights with their signs flipped.</p>\n<table>\n";
+  std::string untested, smallest, left_out;
+  for (const auto& [name, why] : result.not_tested) untested += row(spoken(name), why);
+  for (const auto& r : result.refused) untested += row("Refused: " + spoken(r.name), refusal(r));
+  if (result.not_tested.empty()) untested += row("Everything in the catalogue was tested", "");
   if (!result.smallest_looked_for)
-    page += row("Not looked for", "the study was asked without them (--quick), or has too few flights");
+    smallest += row("Not looked for", "the study was asked without them (--quick), or has too few flights");
   else if (result.minimum_detectable.empty())
-    page += row("None", "no effect of the catalogue shows in these flights at a size that it may have");
+    smallest += row("None", "no effect of the catalogue shows in these flights at a size that it may have");
   for (const auto& [cause, sizes] : result.minimum_detectable)
     for (const auto& [parameter, size] : sizes)
-      page += row(std::string(cause).append(", ").append(parameter), number(size));
-  page += "</table>\n</section>\n<section><h2>Left out</h2>\n<table>\n";
-  if (seen.gated_out.empty()) page += row("Nothing", "every window was good");
-  for (const auto& [gate, count] : seen.gated_out) page += row(to_string(gate), std::to_string(count) + " windows");
-  page += "</table>\n</section>\n";
-  return page;
+      smallest += row(std::string(cause).append(", ").append(parameter), number(size));
+  if (seen.gated_out.empty()) left_out += row("Nothing", "every window was good");
+  for (const auto& [gate, count] : seen.gated_out) left_out += row(to_string(gate), std::to_string(count) + " windows");
+  return report::section("What was not tested, and why", "", report::table(untested)) +
+         report::section("Smallest effects that these flights would show",
+                         "Found with 80 % power, by injection into these flights with their signs flipped.",
+                         report::table(smallest)) +
+         report::section("Left out", "", report::table(left_out));
 }
 
 }  // namespace
 
-tl::expected<std::string, report::PlotError> study_page(const StudyResult& result, const Observations& seen,
-                                                        const PageContext& context) {
+std::string study_page(const StudyResult& result, const Observations& seen, const PageContext& context) {
+  report::PageData data = context.data;
   std::string page = "<h1>What the simulation gets wrong</h1>\n", beside;
   if (context.height) beside = height_sentence(*context.height);
   if (!beside.empty()) beside.insert(0, " ");
@@ -267,18 +264,11 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
            : "failed") +
       "\">" + (context.rotors ? report::escaped(rotor_sentence(*context.rotors)) + " " : "") +
       report::escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
-  for (const auto& cause : result.causes) {
-    const auto drawn = picture(cause, seen);
-    if (!drawn) return tl::make_unexpected(drawn.error());
-    page += "<section><h2>" + report::escaped(spoken(cause.found.form->cause())) + "</h2>\n<p>" +
-            report::escaped(cause.found.form->formula) + "</p>\n" + *drawn + figures(cause, context) + "</section>\n";
-  }
+  for (const auto& cause : result.causes)
+    page += report::section(spoken(cause.found.form->cause()), report::escaped(cause.found.form->formula),
+                            picture(cause, seen, data) + figures(cause, context));
   if (context.height) page += height_section(*context.height);
-  if (context.rotors) {
-    const auto section = rotor_section(*context.rotors);
-    if (!section) return tl::make_unexpected(section.error());
-    page += *section;
-  }
+  if (context.rotors) page += rotor_section(*context.rotors, data);
   if (context.consequence) page += consequence_section(*context.consequence);
   page += unknown_section(result.unknown);
   page += context.residuals;
@@ -289,8 +279,8 @@ tl::expected<std::string, report::PlotError> study_page(const StudyResult& resul
     told.push_back(cause.found.form->cause());
     for (const auto& rival : cause.found.rivals) told.push_back(rival.name);
   }
-  page += self_test_section(told);
-  return report::html_page("backwash study", page);
+  const auto moved = report::interactive(data, report::javascript_folders());
+  return report::html_page("backwash study", page + self_test_section(told) + moved.notes, moved.scripts);
 }
 
 }  // namespace backwash::study

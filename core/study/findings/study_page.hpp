@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "core/report/page/plot.hpp"
+#include "core/report/page/page_data.hpp"
 #include "core/study/calibrate/height_effect.hpp"
 #include "core/study/findings/consequence.hpp"
 #include "core/study/findings/study.hpp"
@@ -19,6 +19,7 @@ struct PageContext {
   std::optional<RotorVerdict> rotors;      ///< against flights known to be sound
   std::optional<calibrate::HeightEffects> height;
   std::string residuals = {};  ///< residual_section(), or empty
+  report::PageData data = {};  ///< of that section
   /// The file as read: what to change is told with its values. Without it nothing is.
   std::optional<Vehicle> read_vehicle = {};
   std::vector<std::string> logs = {};  ///< names of the observed flights, in their order
@@ -26,8 +27,7 @@ struct PageContext {
 
 /// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,
 /// gain, what reach and plan make of it, rivals and the flight to fly next, what was not tested, smallest effects that
-/// would have been found. Error: a figure that could not be drawn.
-tl::expected<std::string, report::PlotError> study_page(const StudyResult& result, const Observations& seen,
-                                                        const PageContext& context);
+/// would have been found.
+std::string study_page(const StudyResult& result, const Observations& seen, const PageContext& context);
 
 }  // namespace backwash::study

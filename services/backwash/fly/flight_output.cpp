@@ -85,9 +85,7 @@ int conclude(const JudgedFlight& judged, const std::string& report, bool json, b
   const auto& [flight, world, context, summary] = judged;
   if (!report.empty()) {
     progress("drawing the report");
-    const auto page = report::flight_report(flight, summary, world, context);
-    if (!page) throw Failure(kUnavailable, report + ":1: " + page.error().message);
-    write_file(report, *page, force);
+    write_file(report, report::flight_report(flight, summary, world, context), force);
   }
   json ? print(to_json(flight, summary, context)) : print_text(flight, summary, context);
   if (summary.ok()) return kOk;

@@ -2,10 +2,9 @@
 #include "services/backwash/fly/story_page.hpp"
 
 #include <cmath>
-#include <sstream>
 
+#include "core/report/figures.hpp"
 #include "core/report/flight_report.hpp"
-#include "core/report/page/figure_parts.hpp"
 #include "core/report/page/interactive.hpp"
 #include "core/report/page/page.hpp"
 #include "core/report/recorded_tables.hpp"
@@ -60,39 +59,30 @@ report::DataTable clearance_table(const FlightStory& story) {
   return report::thinned(std::move(table));
 }
 
-report::Figure path_figure(const FlightStory& story, const report::DataTable& path, const map::OccupancyGrid* map,
-                           std::span<const report::Prism> tube) {
+std::string path_drawing(const FlightStory& story, const report::DataTable& path, const map::OccupancyGrid* map,
+                         std::span<const report::Prism> tube) {
   Vec3 low = story.samples.front().p_W, high = low;
   for (const auto& s : story.samples) {
     low = low.cwiseMin(s.p_W);
     high = high.cwiseMax(s.p_W);
   }
-  std::ostringstream data;
-  data << "$flown << EOD\n";
+  const Vec3 around(1, 1, 0);
+  low -= around;
+  high += around;
+  report::Chart chart{.x = {"x, m", low.x(), high.x()}, .y = {"y, m", low.y(), high.y()}, .equal = true};
+  if (map)
+    chart = report::seen_from_above(*map, low, high, map->center(report::nearest_voxel(*map, low)).z(),
+                                    map->center(report::nearest_voxel(*map, high)).z());
+  if (!tube.empty()) chart.layers.push_back(report::outlines(tube, 0, report::Kind::tube, "sets predicted"));
+  report::Run flown, commanded;
   for (const auto& row : path.rows)
-    if (!std::isnan(row[4])) data << row[1] << ' ' << row[2] << ' ' << row[4] << ' ' << row[5] << '\n';
-  // A row apart, to which no line leads: a flight that never took off has no other.
-  data << '\n' << low.x() << ' ' << low.y() << ' ' << low.x() << ' ' << low.y() << "\nEOD\n" << report::kAxes;
-  std::string cells;
-  if (map) {
-    const auto inside = [&](const Vec3& p) {
-      return Index3(map->index(p).cwiseMax(Index3::Zero()).cwiseMin(map->size() - Index3::Ones()));
-    };
-    const Index3 first = inside(low - Vec3(1, 1, 0)), last = inside(high + Vec3(1, 1, 0));
-    data << report::cell_blocks(*map, first, last, map->center(last).z(), map->center(last).z())
-         << report::view_from_above(*map, first, last);
-    cells = report::plot_cells();
-  } else {
-    data << "set size ratio -1\nset xlabel 'x, m'\nset ylabel 'y, m'\n";
-  }
-  if (!tube.empty()) {
-    data << report::outlines("tube", tube, 0);
-    cells += report::plot_band("tube", "#9cc6ec", "#4a8fce", "sets predicted");
-  }
-  data << "set key outside top center horizontal\nplot " << cells
-       << "$flown using 3:4 with lines linewidth 1.5 linecolor '#888888' title 'commanded', $flown using 1:2 with "
-          "lines linewidth 2 linecolor '#c8371d' title 'flown'\n";
-  return report::draw(data.str(), report::Format::svg, 1000, 520);
+    if (!std::isnan(row[4])) {
+      flown.push_back({row[1], row[2]});
+      commanded.push_back({row[4], row[5]});
+    }
+  chart.layers.push_back({report::Shape::line, report::Kind::commanded, "commanded", {std::move(commanded)}});
+  chart.layers.push_back({report::Shape::line, report::Kind::flown, "flown", {std::move(flown)}});
+  return report::to_svg(chart);
 }
 
 /// Where it was in the air; of a flight that never was, where it stood.
@@ -111,7 +101,7 @@ std::vector<report::Section> sections_of(const FlightStory& story, std::span<con
   std::vector<report::Section> sections;
   const auto path = path_table(story), clearance = clearance_table(story);
   const auto error = report::recorded_error(log, story.zero_ns);
-  sections.push_back({"From above", basis(story), path_figure(story, path, map, data.scene->tube), {}, {"path"}});
+  sections.push_back({"From above", basis(story), path_drawing(story, path, map, data.scene->tube), {"path"}});
   if (world) {
     sections.push_back(report::field_section(way_of(story), *world));
     data.field = report::field_box(*world, report::field_view(world->grid, way_of(story)));
@@ -121,11 +111,19 @@ std::vector<report::Section> sections_of(const FlightStory& story, std::span<con
     report::add_plots(sections, data, table, title, text, std::move(plots));
   };
   add(path, "Height", "Commands are drawn in the air alone.",
-      {{"height", "path", "height", "m", {{"command_z_m", "commanded", "commanded"}, {"z_m", "flown", "flown"}}}});
+      {{"height",
+        "path",
+        "height",
+        "m",
+        {{"command_z_m", "commanded", report::Kind::commanded}, {"z_m", "flown", report::Kind::flown}}}});
   add(error, "Error between its bounds", "Measured position minus the predicted centre, as each tick logged it.",
       report::error_plots(false));
   add(clearance, "Clearance", "On the routes, body to the nearest obstacle.",
-      {{"clearance", "clearance", "clearance", "m", {{"clearance_m", "body to the nearest obstacle", "flown"}}}});
+      {{"clearance",
+        "clearance",
+        "clearance",
+        "m",
+        {{"clearance_m", "body to the nearest obstacle", report::Kind::flown}}}});
   return sections;
 }
 
@@ -139,53 +137,48 @@ report::Scene scene_of(const FlightStory& story, std::span<const log::RawRecord>
   return scene;
 }
 
-std::string row(const std::string& name, const std::string& value) {
-  return "<tr><th>" + name + "</th><td>" + report::escaped(value) + "</td></tr>\n";
-}
-
 std::string figures_table(const FlightStory& s) {
-  std::string text = "<section><h2>In figures</h2>\n<p>" + basis(s) + "</p>\n<table>\n";
-  text += row("The log ends", s.ended);
-  text += row("Time, way in the air", to_text(s.time_s, 2) + " s, " + to_text(s.length_m, 2) + " m");
-  text += row("Take-offs / landings / holds / refused commands",
-              std::to_string(s.take_offs) + " / " + std::to_string(s.landings) + " / " + std::to_string(s.holds) +
-                  " / " + std::to_string(s.refusals));
-  text += row("Clearances", clearances_of(s));
+  std::string text = report::row("The log ends", s.ended);
+  text += report::row("Time, way in the air", to_text(s.time_s, 2) + " s, " + to_text(s.length_m, 2) + " m");
+  text += report::row("Take-offs / landings / holds / refused commands",
+                      std::to_string(s.take_offs) + " / " + std::to_string(s.landings) + " / " +
+                          std::to_string(s.holds) + " / " + std::to_string(s.refusals));
+  text += report::row("Clearances", clearances_of(s));
   if (s.maps.not_judged + s.maps.not_judged_rising > 0)
-    text += row("Ticks without a clearance, on routes / take-offs",
-                std::to_string(s.maps.not_judged) + " / " + std::to_string(s.maps.not_judged_rising));
-  if (s.maps.window_clouds > 0) text += row("Mapper's window", window_of(s.maps));
-  text += row("Largest error over bound, x / y / z", to_text(s.largest_ratio.x(), 2) + " / " +
-                                                         to_text(s.largest_ratio.y(), 2) + " / " +
-                                                         to_text(s.largest_ratio.z(), 2));
-  text += row("Samples inside", std::to_string(s.inside) + " of " + std::to_string(s.judged));
-  text += row("Decided again from what the daemon was told", replay_of(s));
+    text += report::row("Ticks without a clearance, on routes / take-offs",
+                        std::to_string(s.maps.not_judged) + " / " + std::to_string(s.maps.not_judged_rising));
+  if (s.maps.window_clouds > 0) text += report::row("Mapper's window", window_of(s.maps));
+  text += report::row("Largest error over bound, x / y / z", to_text(s.largest_ratio.x(), 2) + " / " +
+                                                                 to_text(s.largest_ratio.y(), 2) + " / " +
+                                                                 to_text(s.largest_ratio.z(), 2));
+  text += report::row("Samples inside", std::to_string(s.inside) + " of " + std::to_string(s.judged));
+  text += report::row("Decided again from what the daemon was told", replay_of(s));
   if (s.beyond_truth > 0)
-    text += row("Ticks that the truth does not cover, judged as measured", std::to_string(s.beyond_truth));
-  text += row("Records lost", std::to_string(s.records_lost));
-  return text + "</table>\n</section>\n";
+    text += report::row("Ticks that the truth does not cover, judged as measured", std::to_string(s.beyond_truth));
+  text += report::row("Records lost", std::to_string(s.records_lost));
+  return report::section("In figures", basis(s), report::table(text));
 }
 
 std::string pieces_table(const FlightStory& s) {
   if (s.pieces.empty()) return "";
-  std::string text = "<section><h2>What was flown</h2>\n<table>\n";
+  std::string text;
   for (const auto& p : s.pieces)
-    text += row(to_text(p.from_s, 2) + " to " + to_text(p.until_s, 2) + " s, " + name_of(p),
-                "to " + to_text(p.goal_W) + " m: " + end_of(p) + "; " + std::to_string(p.inside) + " of " +
-                    std::to_string(p.samples) + " samples inside");
-  return text + "</table>\n</section>\n";
+    text += report::row(to_text(p.from_s, 2) + " to " + to_text(p.until_s, 2) + " s, " + name_of(p),
+                        "to " + to_text(p.goal_W) + " m: " + end_of(p) + "; " + std::to_string(p.inside) + " of " +
+                            std::to_string(p.samples) + " samples inside");
+  return report::section("What was flown", "", report::table(text));
 }
 
 /// Which map judged which part of the way. Nothing where one judged all.
 std::string maps_table(const JudgedMaps& m) {
   if (m.stretches.empty() || (m.stretches.size() == 1 && m.not_judged == 0)) return "";
-  std::string text =
-      "<section><h2>What clearances were judged by</h2>\n<p>Each place by the whole map that was the "
-      "newest then, of " +
-      std::to_string(m.accepted_s.size()) + ".</p>\n<table>\n";
+  std::string text;
   for (const auto& stretch : m.stretches)
-    text += row(to_text(stretch.from_s, 2) + " to " + to_text(stretch.until_s, 2) + " s", by_of(stretch));
-  return text + "</table>\n</section>\n";
+    text += report::row(to_text(stretch.from_s, 2) + " to " + to_text(stretch.until_s, 2) + " s", by_of(stretch));
+  return report::section(
+      "What clearances were judged by",
+      "Each place by the whole map that was the newest then, of " + std::to_string(m.accepted_s.size()) + ".",
+      report::table(text));
 }
 
 }  // namespace
@@ -208,10 +201,7 @@ std::string story_page(const FlightStory& s, std::span<const log::RawRecord> log
     sections = sections_of(s, log, map, context.world, data);
   }
   for (auto& section : report::recorded_sections(log, s.zero_ns, data)) sections.push_back(std::move(section));
-  for (const auto& section : sections) {
-    if (!section.drawing) throw Failure(kUnavailable, section.drawing.error().message);
-    page += report::to_html(section);
-  }
+  for (const auto& section : sections) page += report::to_html(section);
   page += figures_table(s) + pieces_table(s) + maps_table(s.maps);
   auto parameters = context.parameters;
   parameters.emplace_back("As the daemon had them", report::recorded_configuration(log));

@@ -19,7 +19,7 @@ struct StoryContext {
   const plan::World* world = nullptr;  ///< of the map, for the field; null: none is shown
 };
 /// The same as a self-contained HTML page, why the flight was not good first. `map`: what the path is drawn over; null:
-/// nothing. Throws Failure 69 where gnuplot cannot draw.
+/// nothing.
 std::string story_page(const FlightStory& story, std::span<const log::RawRecord> log, const map::OccupancyGrid* map,
                        const StoryContext& context);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/report/flight_report.hpp"
+#include "core/report/page/interactive.hpp"
 #include "core/report/page/page.hpp"
 #include "core/study/calibrate/bound_figure.hpp"
 #include "core/study/calibrate/model_text.hpp"
@@ -17,21 +18,7 @@ namespace {
 
 using namespace study::calibrate;
 
-std::string cells(std::initializer_list<std::string> texts, const char* first = "th") {
-  std::string row = "<tr>";
-  for (const auto& text : texts) {
-    row += std::string("<") + first + ">" + text + "</" + first + ">";
-    first = "td";
-  }
-  return row + "</tr>\n";
-}
-
-template <class... Text>
-std::string heads(Text... texts) {
-  std::string row = "<thead><tr>";
-  ((row += std::string("<th>") + texts + "</th>"), ...);
-  return row + "</tr></thead>\n";
-}
+using report::heads, report::row, report::section, report::table;
 
 std::string share(double part) { return to_text(part, 2); }
 
@@ -45,13 +32,10 @@ std::string verdict_of(const Calibration& c, double quantile) {
 }
 
 std::string constants(const Calibration& c) {
-  std::string text =
-      "<section><h2>Constants</h2>\n<p>With 95 % intervals, by resampling whole flights. An interval that reaches 0: "
-      "these flights cannot tell.</p>\n<div class=\"scroll\"><table class=\"wide\">\n" +
-      heads("constant", "value", "95 % interval", "");
+  std::string text = heads("constant", "value", "95 % interval", "");
   const auto line = [&](const std::string& name, double value, const Interval& ci) {
-    text += cells(
-        {name, formatted("%.4g", value), formatted("%.4g … %.4g", ci.low, ci.high), ci.low <= 0 ? "reaches 0" : ""});
+    text +=
+        row(name, formatted("%.4g", value), formatted("%.4g … %.4g", ci.low, ci.high), ci.low <= 0 ? "reaches 0" : "");
   };
   for (std::size_t p = 0; p < kParameters; ++p)
     if (c.determined[p]) line(std::string(key(static_cast<Parameter>(p))), c.fitted.parameters[p], c.ci95[p]);
@@ -60,77 +44,77 @@ std::string constants(const Calibration& c) {
     line("bound.mean.horizontal, m/s²", c.push->horizontal.value, c.push->horizontal.ci95);
     line("bound.mean.vertical, m/s²", c.push->vertical.value, c.push->vertical.ci95);
   }
-  return text + "</table></div>\n</section>\n";
+  return section(
+      "Constants",
+      "With 95 % intervals, by resampling whole flights. An interval that reaches 0: these flights cannot tell.",
+      table(text, true));
 }
 
 std::string bins(const std::vector<Bin>& all, const char* title, const char* what) {
-  std::string text =
-      std::string("<section><h2>Below the bound, by ") + title +
-      "</h2>\n<p>Share of the windows of flights that were not fitted. Where it is small, or there are few "
-      "windows, hover there.</p>\n<table class=\"wide\">\n" +
-      heads(what, "windows", "x", "y", "z");
+  std::string text = heads(what, "windows", "x", "y", "z");
   for (const auto& b : all) {
     const std::string range = to_text(b.low, 2) + (std::isfinite(b.high) ? " to " + to_text(b.high, 2) : " and more");
-    if (b.windows == 0)
-      text += cells({range, "0", "–", "–", "–"});
-    else
-      text += cells(
-          {range, std::to_string(b.windows), share(b.coverage.x()), share(b.coverage.y()), share(b.coverage.z())});
+    const auto part = [&](int axis) { return b.windows == 0 ? "–" : share(b.coverage[axis]); };
+    text += row(range, std::to_string(b.windows), part(0), part(1), part(2));
   }
-  return text + "</table>\n</section>\n";
+  return section(std::string("Below the bound, by ") + title,
+                 "Share of the windows of flights that were not fitted. Where it is small, or there are few windows, "
+                 "hover there.",
+                 table(text, true));
 }
 
 std::string flights(const Assessment& a, const std::vector<std::string>& logs) {
-  std::string text =
-      "<section><h2>Below the bound, by flight</h2>\n<p>Each against a fit without it.</p>\n<table class=\"wide\">\n" +
-      heads("log", "windows", "x", "y", "z");
+  std::string text = heads("log", "windows", "x", "y", "z");
   for (std::size_t f = 0; f < logs.size(); ++f) {
     const Vec3& c = a.flight_coverage[f];
-    text += cells(
-        {report::escaped(logs[f]), std::to_string(a.flight_windows[f]), share(c.x()), share(c.y()), share(c.z())});
+    text += row(logs[f], std::to_string(a.flight_windows[f]), share(c.x()), share(c.y()), share(c.z()));
   }
-  return text + "</table>\n</section>\n";
+  return section("Below the bound, by flight", "Each against a fit without it.", table(text, true));
 }
 
 std::string refusals_html(std::span<const Refusal> refused) {
   if (refused.empty()) return "";
-  std::string text =
-      "<section><h2>Not determined</h2>\n<p>These stay the base model's, and what would decide them.</p>\n<table "
-      "class=\"wide\">\n" +
-      heads("constants", "why", "fly");
-  for (const auto& r : refused)
-    text += cells({report::escaped(r.what), report::escaped(r.why), report::escaped(r.flight)});
-  return text + "</table>\n</section>\n";
+  std::string text = heads("constants", "why", "fly");
+  for (const auto& r : refused) text += row(r.what, r.why, r.flight);
+  return section("Not determined", "These stay the base model's, and what would decide them.", table(text, true));
 }
 
 std::string left_out(const Campaign& campaign) {
-  std::string text = "<section><h2>What the logs held</h2>\n<table>\n" +
-                     cells({"Windows of 2 s that count", std::to_string(campaign.windows)});
+  std::string text = row("Windows of 2 s that count", std::to_string(campaign.windows));
   for (std::size_t g = 0; g < study::kHoverGates; ++g)
     if (campaign.gated[g] > 0)
-      text += cells({std::string("Left out: ") + study::to_string(static_cast<study::Gate>(g)),
-                     std::to_string(campaign.gated[g])});
-  for (const auto& what : campaign.not_tested) text += cells({"Not tested", report::escaped(what)});
+      text += row(std::string("Left out: ") + study::to_string(static_cast<study::Gate>(g)),
+                  std::to_string(campaign.gated[g]));
+  for (const auto& what : campaign.not_tested) text += row("Not tested", what);
   if (campaign.height && campaign.height->ceiling) {
     const auto& c = *campaign.height->ceiling;
-    text += cells({"Below a ceiling, variance along z by",
-                   formatted("%.3g (%.3g … %.3g): the model has no term for it", c.value, c.ci95.low, c.ci95.high)});
+    text += row("Below a ceiling, variance along z by",
+                formatted("%.3g (%.3g … %.3g): the model has no term for it", c.value, c.ci95.low, c.ci95.high));
   }
-  return text + "</table>\n</section>\n";
+  return section("What the logs held", "", table(text));
 }
 
-std::string surfaces(const Calibration& c, const Campaign& campaign, double quantile) {
-  std::vector<FigurePlace> places;
-  for (std::size_t i = 0; i < campaign.map_names.size(); ++i)
-    places.push_back({campaign.map_names[i], &campaign.maps[i], i});
-  if (places.empty()) places.push_back({"a flat floor", &campaign.maps.front(), 0});
+/// The variance of each window, by where it hovered.
+report::DataTable windows_of(const Campaign& campaign) {
+  report::DataTable table{"windows", {"flight", "x_m", "y_m", "z_m", "variance_x", "variance_y", "variance_z"}, {}, 0};
+  for (const auto& h : campaign.data.hovers)
+    for (const Vec3& v : h.ln_variance)
+      table.rows.push_back({static_cast<double>(h.flight), h.p_W.x(), h.p_W.y(), h.p_W.z(), std::exp(v.x()),
+                            std::exp(v.y()), std::exp(v.z())});
+  return table;
+}
+
+std::string bounds(const Calibration& c, const Campaign& campaign, double quantile) {
   std::string text;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto figure = bound_figure(campaign.data, c.model, axis, places);
-    if (!figure) throw Failure(kUnavailable, figure.error().message);
-    text += std::string("<section><h2>Acceleration along ") + "xyz"[axis] +
-            "</h2>\n<p>Red: variance of each 2 s window. Surface: the bound at quantile " + to_text(quantile, 2) +
-            ", one set of constants for all maps.</p>\n<div class=\"scroll\">" + *figure + "</div></section>\n";
+    std::string charts;
+    for (std::size_t i = 0; i < campaign.maps.size(); ++i)
+      charts += "<h3>" + report::escaped(i < campaign.map_names.size() ? campaign.map_names[i] : "a flat floor") +
+                "</h3>\n" + report::to_svg(bound_chart(campaign.data, c.model, axis, campaign.maps[i], i)) + "\n";
+    text += section(std::string("Acceleration along ") + "xyz"[axis],
+                    "Dots: variance of each 2 s window. Lines: the bound at quantile " + to_text(quantile, 2) +
+                        ", one set of constants for all maps.",
+                    charts + report::files_html({"windows"}));
   }
   return text;
 }
@@ -145,9 +129,12 @@ std::string calibrate_page(const Calibration& c, const Campaign& campaign, std::
   page += refusals_html(refused) + constants(c) +
           bins(c.held_out.by_wall_distance, "distance from walls", "distance, m") +
           bins(c.held_out.by_height, "height", "height, m") + flights(c.held_out, campaign.logs) +
-          surfaces(c, campaign, context.quantile) + left_out(campaign) +
+          bounds(c, campaign, context.quantile) + left_out(campaign) +
           report::parameters_html(own_command(), parameter_files(context.vehicle, context.base_model));
-  return report::html_page("backwash calibration", page);
+  report::PageData data;
+  data.tables.push_back(windows_of(campaign));
+  const auto moved = report::interactive(data, report::javascript_folders());
+  return report::html_page("backwash calibration", page + moved.notes, moved.scripts);
 }
 
 }  // namespace backwash::services

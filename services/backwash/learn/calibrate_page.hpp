@@ -16,7 +16,7 @@ struct CalibratePageContext {
 
 /// A calibration as a self-contained HTML page: how much of flights that were not fitted lay below the bound, by
 /// distance and height; each constant with its interval; what was refused and the flight that would decide it; the
-/// bound over the raw variances. Throws Failure 69 where gnuplot cannot draw.
+/// bound over the raw variances.
 std::string calibrate_page(const study::calibrate::Calibration& calibration, const Campaign& campaign,
                            std::span<const study::calibrate::Refusal> refused, const CalibratePageContext& context);
 

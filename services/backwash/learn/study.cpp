@@ -33,7 +33,7 @@ struct StudyOptions {
 /// What the simulation says of the flights with the model's own terms, and with those of the causes beside them.
 std::string residuals(const StudyOptions& options, const Flights& flights, const Vehicle& vehicle, const Model& model,
                       const map::OccupancyGrid& grid, const study::Observations& measured,
-                      const std::vector<SimulationTerm>& found) {
+                      const std::vector<SimulationTerm>& found, report::PageData& data) {
   FlownAgain again{{}, {}, vehicle, model, grid, options.seed};
   for (const std::size_t k : flights.order()) {
     again.logs.push_back(&flights.logs[k]);
@@ -44,9 +44,7 @@ std::string residuals(const StudyOptions& options, const Flights& flights, const
   const auto before = simulated(again, terms, measured);
   terms.insert(terms.end(), found.begin(), found.end());
   progress("simulating the flights with the causes");
-  const auto section = study::residual_section(measured, before, simulated(again, terms, measured));
-  if (!section) throw Failure(kUnavailable, section.error().message);
-  return *section;
+  return study::residual_section(measured, before, simulated(again, terms, measured), data);
 }
 
 /// An autopilot's own log numbers rotors 1 and 2 as facing ones; the verdict is about 1 and 3. Throws Failure.
@@ -126,9 +124,7 @@ study::StudyOptions study_options(const StudyOptions& options, const std::option
 void write_page(const StudyOptions& options, const study::StudyResult& result, const study::Observations& seen,
                 const study::PageContext& context) {
   progress("drawing");
-  const auto page = study::study_page(result, seen, context);
-  if (!page) throw Failure(kUnavailable, page.error().message);
-  write_file(options.report, *page, options.force);
+  write_file(options.report, study::study_page(result, seen, context), options.force);
 }
 
 void write_model(const StudyOptions& options, const Model& model, const study::StudyResult& result,
@@ -223,11 +219,12 @@ int run(const StudyOptions& options) {
   }
   if (!options.report.empty()) {
     std::string beside = design ? html(*design, options.design) : "";
+    report::PageData data;
     if (options.residuals)
-      beside += residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen));
-    write_page(
-        options, result, seen,
-        {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, vehicle, names});
+      beside += residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen), data);
+    write_page(options, result, seen,
+               {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, data,
+                vehicle, names});
   }
   options.json ? print(json) : services::print_text(result, seen, vehicle, names, consequence, rotors, height);
   if (!options.json) print_beside(flights, design, options.design);

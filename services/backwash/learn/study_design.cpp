@@ -113,18 +113,16 @@ void print_text(const study::Design& design, const DesignOptions& options) {
 }
 
 std::string html(const study::Design& design, const DesignOptions& options) {
-  std::string page = "<section><h2>The next flight</h2>\n<p>" + report::escaped(design.message) + "</p>\n<table>\n";
-  const auto row = [&](const std::string& name, const std::string& value) {
-    page += "<tr><th>" + report::escaped(name) + "</th><td>" + report::escaped(value) + "</td></tr>\n";
-  };
-  for (const auto& set : design.sets) row("To tell apart, with their probabilities", set_of(set));
-  for (const auto& f : told_flights(design)) row(name_of(f), outcome_of(f));
+  using report::row;
+  std::string rows;
+  for (const auto& set : design.sets) rows += row("To tell apart, with their probabilities", set_of(set));
+  for (const auto& f : told_flights(design)) rows += row(name_of(f), outcome_of(f));
   if (const auto* best = design.chosen()) {
-    if (best->voltage) row("Begin with the battery at about", formatted("%.1f V", *best->voltage));
-    row("To fly it", "backwashctl follow " + options.points);
+    if (best->voltage) rows += row("Begin with the battery at about", formatted("%.1f V", *best->voltage));
+    rows += row("To fly it", "backwashctl follow " + options.points);
   }
-  for (const auto& [name, why] : design.left_out) row("Does not fit in the map: " + name, why);
-  return page + "</table>\n</section>\n";
+  for (const auto& [name, why] : design.left_out) rows += row("Does not fit in the map: " + name, why);
+  return report::section("The next flight", report::escaped(design.message), report::table(rows));
 }
 
 }  // namespace backwash::services

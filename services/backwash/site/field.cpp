@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "core/field/disturbance_field.hpp"
-#include "core/report/page/figures.hpp"
+#include "core/report/figures.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/verb.hpp"
@@ -182,10 +182,7 @@ void write_picture(const FieldOptions& options, const map::OccupancyGrid& grid, 
   for (const auto& value : values) {
     if (value.sigma) samples.push_back({value.p_W, *value.sigma});
   }
-  const auto format = options.out.ends_with(".png") ? report::Format::png : report::Format::svg;
-  const auto picture = report::field_slice_figure(grid, slice, samples, format);
-  if (!picture) throw Failure(kUnavailable, options.out + ":1: " + picture.error().message);
-  write_file(options.out, *picture, options.force);
+  write_file(options.out, report::picture_file(report::field_slice(grid, slice, samples), options.out), options.force);
 }
 
 int run(const FieldOptions& options) {

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "core/plan/feasibility.hpp"
-#include "core/report/map_picture.hpp"
+#include "core/report/figures.hpp"
 #include "services/backwash/files.hpp"
 #include "services/parallel/parallel.hpp"
 
@@ -40,10 +40,9 @@ void write_picture(const MapInfoOptions& options, const map::OccupancyGrid& grid
     throw Failure(kUnavailable, options.map + ": --height " + to_text(z, 2) +
                                     " is outside the map, whose heights are " + to_text(low.z(), 2) + " to " +
                                     to_text(high.z(), 2));
-  const auto format = options.out.ends_with(".png") ? report::Format::png : report::Format::svg;
-  const auto picture = report::map_picture(grid, z, format);
-  if (!picture) throw Failure(kUnavailable, options.out + ":1: " + picture.error().message);
-  write_file(options.out, *picture, options.force);
+  auto picture = report::seen_from_above(grid, low, high, z, z);
+  picture.x.name += ", at z = " + to_text(z, 2) + " m (white: free)";
+  write_file(options.out, report::picture_file(std::span(&picture, 1), options.out), options.force);
 }
 
 /// Where the vehicle may hover in this map; empty: nowhere.
@@ -60,15 +59,7 @@ Json flyable_json(const plan::Regions& regions) {
   std::size_t voxels = 0;
   for (const auto& region : regions.regions) voxels += region.voxels;
   Json json = {{"flyable", voxels > 0}, {"hover_safe_voxels", voxels}, {"regions", regions.regions.size()}};
-  json["largest"] = nullptr;
-  if (!regions.regions.empty()) {
-    const auto& largest = regions.regions.front();
-    json["largest"] = {
-        {"volume_m3", largest.volume_m3},
-        {"low", services::to_json(largest.low_W)},
-        {"high", services::to_json(largest.high_W)},
-        {"widest", {{"p", services::to_json(largest.widest_W)}, {"clearance_m", largest.widest_clearance_m}}}};
-  }
+  json["largest"] = regions.regions.empty() ? Json() : services::to_json(regions.regions.front());
   return json;
 }
 

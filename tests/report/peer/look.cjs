@@ -23,7 +23,7 @@ async function look(browser, width, scheme, script) {
 async function measured(browser, width, scheme) {
   const {context, tab, complaints, asked} = await look(browser, width, scheme, true);
   const said = await tab.evaluate(() => ({scroll: document.documentElement.scrollWidth, width: innerWidth, ground: getComputedStyle(document.body).backgroundColor,
-    plots: document.querySelectorAll(".drawn > .plot canvas").length, drawings: document.querySelectorAll("svg").length}));
+    plots: document.querySelectorAll("svg.chart[data-plot] .now").length, drawings: document.querySelectorAll("svg").length}));
   const plane = await tab.$("#plane-which");
   if (plane) await plane.selectOption("2"); // what it shows and tells is looked at too
   await tab.waitForTimeout(plane ? 200 : 0);
@@ -76,10 +76,26 @@ async function worked(browser) {
     const before = await tab.textContent(".cursor output");
     await tab.keyboard.press("ArrowRight");
     said.keyboard = [before, await tab.textContent(".cursor output")];
-    const windows = () => tab.evaluate(() => [...document.querySelectorAll(".plot .dygraph-axis-label-x")].map((e) => e.textContent).join());
+    const windows = () => tab.evaluate(() => [...document.querySelectorAll("svg.chart[data-plot] .tics")].map((e) => e.textContent));
     const whole = await windows();
     await tab.click("#closer");
-    said.zooms = whole !== await windows();
+    said.zooms = (await windows()).every((tics, n) => tics !== whole[n]);
+    await tab.click("#whole");
+    const back = await windows(), charts = await tab.$$("svg.chart"); // by dragging over the first, which is a map, and the last, a plot
+    const area = (chart) => chart.$eval(".area", (e) => e.getAttribute("transform"));
+    said.dragged = back.join() === whole.join();
+    for (const chart of [charts[0], charts[charts.length - 1]]) {
+      await chart.scrollIntoViewIfNeeded();
+      const before = await area(chart), box = await chart.boundingBox();
+      await tab.mouse.move(box.x + 0.4 * box.width, box.y + 0.3 * box.height);
+      await tab.mouse.down();
+      await tab.mouse.move(box.x + 0.5 * box.width, box.y + 0.5 * box.height, {steps: 4});
+      await tab.mouse.up();
+      const near = await area(chart);
+      await tab.mouse.dblclick(box.x + 0.4 * box.width, box.y + 0.3 * box.height);
+      const scale = (text) => text ? +text.match(/scale\(([0-9.e+-]+)/)[1] : 1;
+      said.dragged = said.dragged && scale(near) > 1.5 * scale(before) && Math.abs(scale(await area(chart)) - 1) < 1e-9;
+    }
   }
   for (const button of await tab.$$("button[data-table]")) {
     const [download] = await Promise.all([tab.waitForEvent("download"), button.click()]);

@@ -3,10 +3,11 @@
 
 #include <cstdio>
 
+#include "research/feasibility/set_cost.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/site/world_cache.hpp"
-#include "services/backwash/verb.hpp"
+#include "services/backwash/tool.hpp"
 
 namespace backwash::services {
 namespace {
@@ -38,20 +39,12 @@ plan::Regions::Number region_of(const plan::World& world, const plan::Regions& r
   return regions.of_voxel[world.grid.linear(v)];
 }
 
-Json to_json(const plan::Region& r, const plan::World&) {
-  return {{"voxels", r.voxels},
-          {"volume_m3", r.volume_m3},
-          {"low", services::to_json(r.low_W)},
-          {"high", services::to_json(r.high_W)},
-          {"widest", {{"p", services::to_json(r.widest_W)}, {"clearance_m", r.widest_clearance_m}}}};
-}
-
 void print_json(const plan::World& world, const plan::Regions& regions, const std::optional<Way>& way,
                 const std::optional<Sets>& sets) {
   Json list = Json::array();
   std::size_t voxels = 0;
   for (const auto& region : regions.regions) {
-    list.push_back(to_json(region, world));
+    list.push_back(services::to_json(region));
     voxels += region.voxels;
   }
   Json json = {{"resolution_m", world.grid.resolution()}, {"hover_safe_voxels", voxels}, {"regions", std::move(list)}};
@@ -148,8 +141,6 @@ int run(const FeasibilityOptions& options) {
   return kOk;
 }
 
-}  // namespace
-
 Verb feasibility_verb(Command& app) {
   auto options = std::make_shared<FeasibilityOptions>();
   auto& command = app.add_subcommand("feasibility", "Where a vehicle can hover safely, and where a way is too tight");
@@ -168,4 +159,10 @@ Verb feasibility_verb(Command& app) {
   return {&command, [options] { return run(*options); }};
 }
 
+}  // namespace
 }  // namespace backwash::services
+
+/// `backwash feasibility`, which runs this program.
+int main(int argc, char** argv) {
+  return backwash::services::run_tool(argc, argv, {backwash::services::feasibility_verb});
+}

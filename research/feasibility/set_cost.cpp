@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "research/feasibility/set_cost.hpp"
+
 #include <algorithm>
 #include <functional>
 #include <limits>
 #include <utility>
 
-#include "core/plan/feasibility.hpp"
 #include "core/reach/clearance.hpp"
 #include "core/reach/response/integrator.hpp"
 
