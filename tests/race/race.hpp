@@ -31,8 +31,4 @@ int judge_real_flights(const std::string& folder);
 /// What each vehicle's hover flights said of each air.
 int print_calibrations();
 
-/// Whether the larger steps of flown.hpp fly as core/sim does: deviations of the error and contacts by core/sim, by
-/// steps of 1 ms and as raced.
-int compare_steps();
-
 }  // namespace backwash::race
