@@ -28,7 +28,4 @@ int print_factors(const std::string& folder);
 /// motion that a loop fitted to the other flights predicts. Hovers without set-points: about the mean of two seconds.
 int judge_real_flights(const std::string& folder);
 
-/// What each vehicle's hover flights said of each air.
-int print_calibrations();
-
 }  // namespace backwash::race

@@ -277,13 +277,6 @@ TEST(BoundCode, NoBoundReadFromARandomMapIsBelowTheFieldsOrATwoThousandthAboveIt
   }
 }
 
-TEST(BoundCode, NoneOfABuildingIsEither) {
-  const std::string file = BACKWASH_SOURCE_DIR "/tests/data/maps/geb079.bt";
-  const Model model = *config::load_model("builtin:quad-5in");
-  const auto world = plan::build_world(*map::load_map(file), model, *config::load_vehicle("builtin:quad-5in"));
-  EXPECT_GT(expect_rounded_up(*world, model, 20000, 12, 1), 2000);
-}
-
 TEST(BoundCode, IsTheLeastOfTwelveSignificantBitsThatIsNotBelow) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> exponent(-15, 15.999);
