@@ -15,15 +15,9 @@ namespace {
 
 using map::Cell;
 using map::OccupancyGrid;
+using scene::free_voxels;
 
 const Variance kFallback{7, 0.1, 0.2, 8, 0.3, 9};
-
-std::vector<std::size_t> free_voxels(const OccupancyGrid& grid) {
-  std::vector<std::size_t> voxels;
-  for (std::size_t n = 0; n < grid.cell_count(); ++n)
-    if (grid.at(n) == Cell::free) voxels.push_back(n);
-  return voxels;
-}
 
 /// Σ_v w_v Σ(v) / Σ_v w_v with w the product of the hats 1 − |x|, over every voxel of the grid that is free.
 Mat3 hat_average(const OccupancyGrid& grid, const ProximityField& exact, const Vec3& p) {

@@ -17,13 +17,7 @@ namespace {
 
 using map::Cell;
 using map::OccupancyGrid;
-
-std::vector<std::size_t> free_voxels(const OccupancyGrid& grid) {
-  std::vector<std::size_t> voxels;
-  for (std::size_t n = 0; n < grid.cell_count(); ++n)
-    if (grid.at(n) == Cell::free) voxels.push_back(n);
-  return voxels;
-}
+using scene::free_voxels;
 
 double difference(const Mat3& actual, const Mat3& expected) {
   return (actual - expected).cwiseAbs().maxCoeff() / expected.cwiseAbs().maxCoeff();

@@ -49,9 +49,9 @@ TEST(MapParts, OneMapArrivesAtATimeUntilItsSenderIsSilent) {
   next.part.transfer = 8;
   MapParts parts(1u << 20, "map");
   ASSERT_TRUE(parts.take(map.of(0, 1), kOne, 0));
-  EXPECT_FALSE(parts.take(next.of(0, 1), kOther, MapParts::kYield_ns - 1));
+  EXPECT_FALSE(parts.take(next.of(0, 1), kAnother, MapParts::kYield_ns - 1));
   EXPECT_FALSE(parts.stalled(MapParts::kYield_ns));
-  EXPECT_TRUE(parts.take(next.of(0, 1), kOther, MapParts::kYield_ns));
+  EXPECT_TRUE(parts.take(next.of(0, 1), kAnother, MapParts::kYield_ns));
   const auto line = parts.stalled(MapParts::kYield_ns);
   ASSERT_TRUE(line);
   EXPECT_THAT(*line, HasSubstr("1 of 3 parts came in 0 s, and another began in its place"));
@@ -65,7 +65,7 @@ TEST(MapParts, WhoOnlyRepeatsAPartHoldsItsPlaceNoLonger) {
   ASSERT_TRUE(parts.take(map.of(0, 1), kOne, 0));
   std::int64_t now = 0;
   for (; now < MapParts::kYield_ns; now += 10 * kMs) ASSERT_TRUE(parts.take(map.of(0, now), kOne, now));
-  EXPECT_EQ(*parts.take(next.of(0, 1), kOther, now), MapParts::Taken::begins);
+  EXPECT_EQ(*parts.take(next.of(0, 1), kAnother, now), MapParts::Taken::begins);
   // The operator is told of it, and what came is let go.
   MapParts alone(1u << 20, "map");
   ASSERT_TRUE(alone.take(map.of(0, 1), kOne, 0));
@@ -85,15 +85,15 @@ TEST(MapParts, AWholeMapIsNotDisplacedBeforeItsSenderKnowsWhatBecameOfIt) {
   next.part.transfer = 8;
   MapParts parts(1u << 20, "map");
   ASSERT_EQ(*parts.take(map.of(0, 1), kOne, 0), MapParts::Taken::whole);
-  EXPECT_FALSE(parts.take(next.of(0, 1), kOther, kSecond));
+  EXPECT_FALSE(parts.take(next.of(0, 1), kAnother, kSecond));
   ASSERT_EQ(*parts.take(map.of(0, 2), kOne, 2 * kSecond), MapParts::Taken::here) << "it asks";
-  EXPECT_FALSE(parts.take(next.of(0, 2), kOther, 3 * kSecond));
+  EXPECT_FALSE(parts.take(next.of(0, 2), kAnother, 3 * kSecond));
   parts.judge({7, true, {}});
   const auto receipt = parts.receipt(4 * kSecond);
   ASSERT_TRUE(receipt);
   EXPECT_EQ(receipt->transfer, 7u);
   EXPECT_EQ(receipt->state, backwash_msgs_msg_dds__MAPRECEIPT_ACCEPTED);
-  EXPECT_EQ(*parts.take(next.of(0, 3), kOther, 4 * kSecond), MapParts::Taken::begins);
+  EXPECT_EQ(*parts.take(next.of(0, 3), kAnother, 4 * kSecond), MapParts::Taken::begins);
 }
 
 // The map worker is never given it, and says nothing of it: its sender would wait for as long as it is answered.
@@ -174,12 +174,12 @@ TEST(MapParts, AMapWhoseSenderIsGoneMakesRoomAtOnceAndIsTold) {
   next.part.transfer = 8;
   MapParts parts(1u << 20, "map");
   ASSERT_TRUE(parts.take(map.of(1, 1), kOne, 0));
-  EXPECT_FALSE(parts.let_go(std::vector{kOther}));
-  const auto line = parts.let_go(std::vector{kOther, kOne});
+  EXPECT_FALSE(parts.let_go(std::vector{kAnother}));
+  const auto line = parts.let_go(std::vector{kAnother, kOne});
   ASSERT_TRUE(line);
   EXPECT_THAT(*line, HasSubstr("1 of 3 parts came in 0 s, and its sender is gone"));
   EXPECT_FALSE(parts.let_go(std::vector{kOne}));
-  EXPECT_EQ(*parts.take(next.of(0, 1), kOther, 1), MapParts::Taken::begins);
+  EXPECT_EQ(*parts.take(next.of(0, 1), kAnother, 1), MapParts::Taken::begins);
 }
 
 TEST(MapParts, AMapThatArrivesDamagedIsRefusedInItsReceipts) {
@@ -259,7 +259,7 @@ TEST(MapFront, TellsTheSenderOfPartsThatANewerWholeMapTookItsPlace) {
 
 constexpr double kOnLine = 1310;  // byte of a part on the line: its data, the message, RTPS, UDP and IP
 
-struct Line {
+struct RadioLine {
   double rate = 125e3;  ///< byte/s
   double queue_s = 0.5, loss = 0.3;
   std::int64_t least_ns = 50 * kMs, most_ns = 100 * kMs;
@@ -277,7 +277,8 @@ struct Sent {
 /// A map over a line until it is whole, or for `until_s`.
 class Flight {
  public:
-  Flight(const Line& line, std::size_t size, double most = 12.5e6) : line_(line), map_(size), sending_(size, most, 0) {}
+  Flight(const RadioLine& line, std::size_t size, double most = 12.5e6)
+      : line_(line), map_(size), sending_(size, most, 0) {}
 
   Sent run(double until_s) {
     std::int64_t now = 0;
@@ -332,7 +333,7 @@ class Flight {
     sending_.hear(answer.receipt, now);
   }
 
-  Line line_;
+  RadioLine line_;
   Map map_;
   dds::MapSending sending_;
   MapParts parts_{48u << 20, "map"};
@@ -345,12 +346,12 @@ class Flight {
 };
 
 /// s that a map of so many bytes needs on this line if no part is sent but those that were lost.
-double least_s(const Line& line, std::size_t size) {
+double least_s(const RadioLine& line, std::size_t size) {
   return dds::parts_of(size) * kOnLine / line.rate / (1 - line.loss);
 }
 
 TEST(MapParts, TwentyMebibytesArriveOverALineOfOneMegabitThatLosesThreeInTen) {
-  const Line line;
+  const RadioLine line;
   Flight flight(line, 20u << 20);
   const Sent sent = flight.run(600);
   ASSERT_TRUE(flight.whole()) << sent.held << " parts in " << sent.took_s << " s";
@@ -368,7 +369,7 @@ TEST(MapParts, TwentyMebibytesArriveOverALineOfOneMegabitThatLosesThreeInTen) {
 
 TEST(MapParts, ALineWithoutLossIsFilledAndNothingIsSentTwice) {
   for (const double rate : {125e3, 12.5e6}) {
-    const Line line{.rate = rate, .loss = 0, .least_ns = kMs, .most_ns = 2 * kMs};
+    const RadioLine line{.rate = rate, .loss = 0, .least_ns = kMs, .most_ns = 2 * kMs};
     Flight flight(line, 8u << 20);
     const Sent sent = flight.run(300);
     ASSERT_TRUE(flight.whole());
@@ -378,7 +379,7 @@ TEST(MapParts, ALineWithoutLossIsFilledAndNothingIsSentTwice) {
 }
 
 TEST(MapParts, ALineWithoutAQueueLosesAtMostEveryOtherPartToTheRate) {
-  const Line line{.queue_s = 0.02, .loss = 0};
+  const RadioLine line{.queue_s = 0.02, .loss = 0};
   Flight flight(line, 2u << 20);
   const Sent sent = flight.run(300);
   ASSERT_TRUE(flight.whole());
@@ -387,7 +388,7 @@ TEST(MapParts, ALineWithoutAQueueLosesAtMostEveryOtherPartToTheRate) {
 }
 
 TEST(MapParts, TheGivenRateIsNeverExceeded) {
-  const Line line{.rate = 12.5e6, .loss = 0, .least_ns = kMs, .most_ns = kMs};
+  const RadioLine line{.rate = 12.5e6, .loss = 0, .least_ns = kMs, .most_ns = kMs};
   Flight flight(line, 1u << 20, 50e3);
   const Sent sent = flight.run(300);
   ASSERT_TRUE(flight.whole());
@@ -395,7 +396,7 @@ TEST(MapParts, TheGivenRateIsNeverExceeded) {
 }
 
 TEST(MapParts, ALineThatDiesIsNoticedByTheSenderAndSendsLittleMore) {
-  const Line line{.dead_after_s = 30};
+  const RadioLine line{.dead_after_s = 30};
   Flight flight(line, 20u << 20);
   const Sent sent = flight.run(60);
   EXPECT_FALSE(flight.whole());
