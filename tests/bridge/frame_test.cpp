@@ -12,7 +12,6 @@ namespace backwash::mavlink::test {
 namespace {
 
 constexpr std::uint8_t kHeartbeatCrcExtra = 50;  // of common.xml
-constexpr std::uint8_t kLocalPositionCrcExtra = 185;
 
 /// A frame put together from the MAVLink guide's layout with the bitwise checksum.
 Bytes by_hand(Bytes header, const Bytes& payload, std::uint8_t crc_extra, const Bytes& signature = {}) {
@@ -62,12 +61,6 @@ TEST(MavlinkCrc, EqualsThePublishedCheckValueAndTheBitwiseDefinition) {
 
 TEST(MavlinkCrc, CrcExtraFollowsFromTheDefinitions) {
   // Published values of common.xml.
-  EXPECT_EQ(info<Heartbeat>().crc_extra, 50);
-  EXPECT_EQ(info<LocalPositionNed>().crc_extra, 185);
-  EXPECT_EQ(info<SetPositionTargetLocalNed>().crc_extra, 143);
-  EXPECT_EQ(info<CommandLong>().crc_extra, 152);
-  EXPECT_EQ(info<Statustext>().crc_extra, 83);  // an array
-  EXPECT_EQ(info<Odometry>().crc_extra, 91);    // arrays and extensions
   EXPECT_EQ(info<SimState>().crc_extra, 32);
   EXPECT_EQ(info<HilGps>().crc_extra, 124);
   EXPECT_EQ(info<ManualControl>().crc_extra, 243);
@@ -86,35 +79,6 @@ TEST(MavlinkFrame, EncodesAHeartbeatAsTheGuideLaysItOut) {
       .custom_mode = 0x60000, .type = 2, .autopilot = 12, .base_mode = 0xD1, .system_status = 4, .mavlink_version = 3};
   const EncodedFrame f = encode_frame({1, 1, 7}, m);
   EXPECT_EQ(Bytes(f.view().begin(), f.view().end()), heartbeat(7));
-}
-
-TEST(MavlinkFrame, CutsTrailingZerosButTheFirstByte) {
-  EXPECT_EQ(encode(SystemTime{}).length, 1U);
-  EXPECT_EQ(encode(LocalPositionNed{.time_boot_ms = 1, .x = 1.0F}).length, 8U);
-  const Bytes cut{1, 0, 0, 0, 0, 0, 0x80, 0x3F};  // time 1, x = 1.0
-  const auto frames = parse(by_hand({0xFD, 8, 0, 0, 0, 1, 1, 32, 0, 0}, cut, kLocalPositionCrcExtra));
-  ASSERT_EQ(frames.size(), 1U);
-  const auto m = decode<LocalPositionNed>(frames[0].payload);
-  EXPECT_EQ(m.time_boot_ms, 1U);
-  EXPECT_EQ(m.x, 1.0F);
-  EXPECT_EQ(m.vz, 0.0F);
-}
-
-TEST(MavlinkFrame, TakesBothLengthsOfTimesyncAndSysStatus) {
-  Bytes timesync(18, 0);
-  timesync[0] = 5;
-  timesync[8] = 9;
-  timesync[16] = 1;
-  timesync[17] = 191;
-  EXPECT_EQ(decode<Timesync>(timesync).target_component, 191);
-  const auto older = decode<Timesync>(std::span(timesync).first(16));
-  EXPECT_EQ(older.tc1, 5);
-  EXPECT_EQ(older.ts1, 9);
-  EXPECT_EQ(older.target_component, 0);
-  Bytes status(43, 1);
-  EXPECT_EQ(decode<SysStatus>(status).onboard_control_sensors_health_extended, 0x01010101U);
-  EXPECT_EQ(decode<SysStatus>(std::span(status).first(31)).onboard_control_sensors_health_extended, 0U);
-  EXPECT_EQ(decode<SysStatus>(std::span(status).first(31)).battery_remaining, 1);
 }
 
 TEST(MavlinkParser, AcceptsVersion1OfExactLengthOnly) {
@@ -182,87 +146,6 @@ TEST(MavlinkParser, ResultDoesNotDependOnHowTheStreamIsSplit) {
   std::vector<Received> frames;
   for (const auto byte : stream) collect(bytewise, {&byte, 1}, frames);
   EXPECT_EQ(sequences(frames), expected);
-}
-
-/// Damages frames as a serial line does; the number in a frame's time_boot_ms tells which one arrived.
-class NoisyLine {
- public:
-  struct Sent {
-    Bytes bytes;
-    bool damaged;  // not all of the frame's bytes are there and right
-  };
-  Bytes whole(std::uint32_t number) {
-    const auto f32 = [&] { return std::bit_cast<float>(static_cast<std::uint32_t>(random_())); };
-    const LocalPositionNed m{number, f32(), f32(), f32(), f32(), f32(), f32()};
-    const auto f = encode_frame({1, 1, static_cast<std::uint8_t>(number)}, m);
-    return {f.view().begin(), f.view().end()};
-  }
-  Sent damage(Bytes frame) {
-    switch (below(8)) {
-      case 0:
-        for (std::size_t k = 0; k < 1 + below(4); ++k)
-          frame[below(frame.size())] ^= static_cast<std::uint8_t>(1U << below(8));
-        return {frame, true};
-      case 1:
-        frame.resize(below(frame.size()));
-        return {frame, true};
-      case 2: {  // garbage before it, rich in start bytes
-        Bytes garbage(below(60));
-        for (auto& g : garbage) g = static_cast<std::uint8_t>(below(4) == 0 ? 0xFD + below(2) : below(256));
-        return {garbage + frame, false};
-      }
-      default:
-        return {frame, false};
-    }
-  }
-  std::size_t below(std::size_t n) { return random_() % n; }
-
- private:
-  std::mt19937 random_{20250101};
-};
-
-TEST(MavlinkParser, AcceptsNoBadFrameAndIsBackInStepWithinOneFrame) {
-  NoisyLine line;
-  Parser parser;
-  std::vector<Received> out;
-  std::vector<std::uint32_t> whole;  // numbers of the known frames that were sent undamaged
-  std::size_t bytes = 0, damaged = 0;
-  for (std::uint32_t number = 1; bytes < 1'000'000; ++number) {
-    const bool unknown = line.below(4) == 0;
-    const auto sent = line.damage(unknown ? unknown_message(static_cast<std::uint8_t>(number)) : line.whole(number));
-    damaged += sent.damaged;
-    if (!sent.damaged && !unknown) whole.push_back(number);
-    bytes += sent.bytes.size();
-    collect(parser, sent.bytes, out);
-  }
-  collect(parser, Bytes(2 * kMaxFrame, 0), out);
-  std::vector<std::uint32_t> arrived;
-  for (const Received& r : out) {
-    ASSERT_TRUE(frame_is_good(r.bytes));
-    arrived.push_back(decode<LocalPositionNed>(r.payload).time_boot_ms);
-  }
-  ASSERT_TRUE(std::ranges::is_sorted(arrived));
-  std::vector<std::uint32_t> lost;
-  std::ranges::set_difference(whole, arrived, std::back_inserter(lost));
-  // An unknown message cut short may seem to end at a start byte inside the next frame, which is then lost: 1 in about
-  // 5000 damaged frames, and never two in a row.
-  EXPECT_LE(lost.size(), damaged / 1000);
-  const auto adjacent = [&](auto a, auto b) { return std::ranges::find(whole, a) + 1 == std::ranges::find(whole, b); };
-  EXPECT_EQ(std::ranges::adjacent_find(lost, adjacent), lost.end());
-  // Damaged frames can come through whole (one bit flipped twice), so `arrived` may hold more.
-  EXPECT_LE(arrived.size(), whole.size() + damaged / 50);
-  EXPECT_GT(damaged, 4000U);
-  EXPECT_EQ(parser.counters().bytes, bytes + 2 * kMaxFrame);
-  EXPECT_GT(parser.counters().bad_crc, 1000U);
-  EXPECT_GT(parser.counters().unknown_id, 1000U);
-}
-
-TEST(MavlinkParser, AcceptsNothingFromNoise) {
-  // Chance of a false frame in 10⁶ bytes: 10⁶·28/2⁴⁰ = 3e-5 as MAVLink 1 (start byte, id, length, checksum), less as 2.
-  std::mt19937 random(7);
-  Bytes noise(1'000'000);
-  for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());
-  EXPECT_TRUE(parse(noise).empty());
 }
 
 }  // namespace

@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/config/config.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "core/config/config.hpp"
+#include "core/config/daemon_config.hpp"
 #include "tests/config/file_texts.hpp"
 
 namespace backwash::config {
@@ -223,6 +230,221 @@ TEST(LoadModel, TakesWholeNumbersToo) {
 TEST(LoadModel, RefusesAQuotedKeyThatLooksLikeAPath) {
   EXPECT_THAT(message(false, std::string("\"wall.k2\" = 1.0\n") + shipped("quad-5in.model.toml")),
               HasSubstr("unknown"));
+}
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr const char* kKp = "kp = { horizontal = 10.0, vertical = 12.0 }   # 1/s²\n";
+constexpr const char* kKd = "kd = { horizontal = 5.5, vertical = 6.0 }     # 1/s\n";
+
+TEST(LoadVehicle, MultipliesPx4CascadedGains) {
+  // docs/model.md section 4: k_p = P_pos·P_vel, k_d = P_vel; PX4's defaults 0.95, 1.8, 1.0, 4.0 where a key is absent.
+  std::string text = replaced(shipped("quad-5in.vehicle.toml"), kKp, "px4 = { MPC_XY_P = 1.5, MPC_Z_VEL_P_ACC = 5 }\n");
+  const TemporaryFile file(replaced(text, kKd, ""));
+  const auto v = load_vehicle(file.path);
+  ASSERT_TRUE(v) << v.error().message;
+  EXPECT_DOUBLE_EQ(v->controller.kp.horizontal, 1.5 * 1.8);
+  EXPECT_DOUBLE_EQ(v->controller.kd.horizontal, 1.8);
+  EXPECT_DOUBLE_EQ(v->controller.kp.vertical, 1.0 * 5);
+  EXPECT_DOUBLE_EQ(v->controller.kd.vertical, 5);
+}
+
+TEST(LoadVehicle, WantsEitherGainsOrPx4) {
+  const std::string text = shipped("quad-5in.vehicle.toml");
+  const std::string right = "needs either both kp and kd, or px4 and neither of them";
+  EXPECT_THAT(message(true, replaced(text, kKp, "px4 = {}\n")), HasSubstr(right));
+  EXPECT_THAT(message(true, replaced(text, kKd, "")), HasSubstr("key 'controller.kd' = (missing): " + right));
+  EXPECT_THAT(message(true, replaced(replaced(text, kKd, ""), kKp, "")), HasSubstr(right));
+  EXPECT_THAT(message(true, replaced(text, kKp, std::string(kKp) + "px4 = {}\n")), HasSubstr(right));
+}
+
+TEST(LoadVehicle, RefusesAnUnstableLoop) {
+  // Without delay s²(lag s + 1) + kd s + kp is stable iff kd > kp·lag (Routh): for kp 12, kd 6 the limit is lag 0.5 s,
+  // for the horizontal 10, 5.5 it is 0.55 s.
+  const std::string text = shipped("quad-5in.vehicle.toml"), lag = "attitude_lag = 0.05";
+  EXPECT_EQ(message(true, replaced(text, lag, "attitude_lag = 0.499")), "");
+  EXPECT_THAT(message(true, replaced(text, lag, "attitude_lag = 0.501")), HasSubstr("unstable"));
+  // Double integrator with delay d: |L| = 1 at ω² = (kd² + √(kd⁴ + 4kp²))/2, limit d = atan(kd ω/kp)/ω = 0.2007 s for
+  // (12, 6) and 0.2194 s for (10, 5.5).
+  const std::string no_lag = replaced(text, lag, "attitude_lag = 0.0"), delay = "feedback_delay = 0.0 ";
+  EXPECT_EQ(message(true, replaced(no_lag, delay, "feedback_delay = 0.200 ")), "");
+  EXPECT_THAT(message(true, replaced(no_lag, delay, "feedback_delay = 0.201 ")), HasSubstr("unstable"));
+}
+
+TEST(LoadVehicle, ReadsTheVelocitysIntegratorAndHasNoneWithoutTheKey) {
+  const std::string text = shipped("quad-5in.vehicle.toml"),
+                    with = "velocity_integrator = { horizontal = 0.4, vertical = 2 }\n";
+  const auto integrator = [](const std::string& content) {
+    const TemporaryFile file(content);
+    const auto v = load_vehicle(file.path);
+    EXPECT_TRUE(v) << v.error().message;
+    return v ? v->controller.velocity_integrator : Vehicle::HorizontalVertical{-1, -1};
+  };
+  EXPECT_EQ(integrator(text).horizontal, 0);
+  EXPECT_EQ(integrator(text).vertical, 0);
+  EXPECT_EQ(integrator(replaced(text, kKp, with + kKp)).horizontal, 0.4);
+  EXPECT_EQ(integrator(replaced(text, kKp, with + kKp)).vertical, 2);
+  const auto px4 = [&](const char* gains) { return replaced(replaced(text, kKd, ""), kKp, gains); };
+  EXPECT_EQ(integrator(px4("px4 = {}\n")).horizontal, 0);
+  EXPECT_EQ(integrator(px4("px4 = { MPC_XY_VEL_I_ACC = 0.4, MPC_Z_VEL_I_ACC = 2 }\n")).vertical, 2);
+  EXPECT_THAT(message(true, px4(("px4 = {}\n" + with).c_str())), HasSubstr("px4 has MPC_XY_VEL_I_ACC"));
+  EXPECT_THAT(message(true, px4("px4 = { MPC_XY_VEL_I_ACC = 0.4 }\n")),
+              HasSubstr("needs both horizontal and vertical"));
+  EXPECT_THAT(message(true, replaced(text, kKp, std::string(kKp) + "velocity_integrator = { horizontal = 0.4 }\n")),
+              HasSubstr("velocity_integrator.vertical"));
+}
+
+TEST(LoadVehicle, RefusesAnIntegratorThatMakesTheLoopUnstable) {
+  // Without lag and delay s³ + kd s² + (kp + ki) s + ki kp/kd is stable iff kd² (kp + ki) > ki kp (Routh). With kp 20
+  // and kd 2 that is ki < 5.
+  const auto file = [&](const char* ki) {
+    std::string text = replaced(shipped("quad-5in.vehicle.toml"), "attitude_lag = 0.05", "attitude_lag = 0.0");
+    text = replaced(text, kKp,
+                    std::string("velocity_integrator = { horizontal = ") + ki +
+                        ", vertical = 1 }\nkp = { horizontal = 20.0, vertical = 12.0 }\n");
+    return replaced(text, kKd, "kd = { horizontal = 2.0, vertical = 6.0 }\n");
+  };
+  EXPECT_EQ(message(true, file("4.99")), "");
+  EXPECT_THAT(message(true, file("5.01")), HasSubstr("unstable"));
+}
+
+TEST(LoadVehicle, RefusesThrustBelowWeight) {
+  EXPECT_THAT(message(true, replaced(shipped("quad-5in.vehicle.toml"), "max_thrust = 18.0", "max_thrust = 8.8")),
+              HasSubstr("key 'propulsion.max_thrust' = 8.8: needs more than the vehicle's weight"));
+}
+
+TEST(LoadVehicle, RefusesAMissingOrEmptyName) {
+  const std::string text = shipped("quad-5in.vehicle.toml");
+  EXPECT_THAT(message(true, replaced(text, "name = \"quad-5in\"", "")), HasSubstr("key 'name' = (missing)"));
+  EXPECT_THAT(message(true, replaced(text, "\"quad-5in\"", "\"\"")), HasSubstr("key 'name' = "));
+  EXPECT_THAT(message(true, replaced(text, "\"quad-5in\"", "5")), HasSubstr("key 'name' = 5: needs a string"));
+}
+
+TEST(LoadVehicle, TellsWhatCannotBeFound) {
+  for (const char* path : {"builtin:quad-6in", "/nonexistent/v.toml", "/tmp"}) {
+    const auto v = load_vehicle(path);
+    ASSERT_FALSE(v);
+    EXPECT_EQ(v.error().kind, ConfigError::Kind::not_found);
+    EXPECT_THAT(v.error().message, StartsWith(std::string(path) + ": "));
+  }
+  EXPECT_THAT(load_vehicle("builtin:quad-6in").error().message, HasSubstr("builtin:quad-5in builtin:quad-7in"));
+}
+
+// Where the ranges of single keys end, from both sides.
+
+std::string shipped(const std::string& name) {
+  std::ifstream in(std::string(BACKWASH_SOURCE_DIR "/core/config/files/") + name);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Loads the shipped file with the number behind `key = ` replaced; the error, "" if it is taken.
+template <typename Load>
+std::string error_with(const Load& load, const std::string& file, const std::string& key, const std::string& value) {
+  std::string text = shipped(file);
+  const std::size_t at = text.find("\n" + key + " = ");
+  EXPECT_NE(at, std::string::npos) << key;
+  const std::size_t from = at + key.size() + 4;
+  const std::size_t to = std::min(text.find('#', from), text.find('\n', from));
+  text.replace(from, to - from, value + " ");
+  const std::string path = testing::TempDir() + "backwash_limits_test_" + std::to_string(getpid()) + ".toml";
+  std::ofstream(path) << text;
+  const auto read = load(path);
+  std::filesystem::remove(path);
+  return read ? std::string() : read.error().message;
+}
+
+struct Limit {
+  const char *key, *taken, *refused;
+};
+
+TEST(Limits, OfTheDaemonsFileEndWhereTheyAreSaidTo) {
+  for (const Limit& l : {Limit{"system", "1", "0"},
+                         {"system", "250", "251"},
+                         {"priority", "0", "-1"},
+                         {"priority", "98", "99"},
+                         {"cpu", "-1", "-2"},
+                         {"cpu", "1023", "1024"},
+                         {"domain", "0", "-1"},
+                         {"domain", "230", "231"},
+                         {"battery_land", "0", "-0.01"},
+                         {"battery_land", "1", "1.01"},
+                         {"max_mib", "1", "0.9"},
+                         {"max_mib", "65536", "65537"},
+                         {"closing_speed", "0", "-0.1"},
+                         {"closing_speed", "5", "5.1"},
+                         {"sensor_range", "0.5", "0.4"},
+                         {"sensor_range", "100", "101"},
+                         {"baud", "9600", "9599"}}) {
+    EXPECT_EQ(error_with(load_daemon, "backwashd.daemon.toml", l.key, l.taken), "") << l.key;
+    EXPECT_NE(error_with(load_daemon, "backwashd.daemon.toml", l.key, l.refused).find("needs a number in"),
+              std::string::npos)
+        << l.key << " = " << l.refused;
+  }
+}
+
+TEST(Limits, OfTheVehiclesFileEndWhereTheyAreSaidTo) {
+  for (const Limit& l : {Limit{"v_max", "20", "20.1"},
+                         {"a_max", "30", "30.1"},
+                         {"radius", "5", "5.1"},
+                         {"diagonal_radius", "5", "5.1"},
+                         {"latency", "0.3", "0.31"},
+                         {"thr_mdl_fac", "1", "1.01"},
+                         {"velocity", "5", "5.1"},
+                         // Lengths, masses and limits are above zero; delays and errors may be zero.
+                         {"radius", "0.001", "0"},
+                         {"mass", "0.001", "0"},
+                         {"v_max", "0.001", "0"},
+                         {"a_max", "0.001", "0"},
+                         {"latency", "0", "-0.001"},
+                         {"velocity", "0", "-0.001"}}) {
+    EXPECT_EQ(error_with(load_vehicle, "quad-5in.vehicle.toml", l.key, l.taken), "") << l.key;
+    EXPECT_NE(error_with(load_vehicle, "quad-5in.vehicle.toml", l.key, l.refused).find("needs a number in"),
+              std::string::npos)
+        << l.key << " = " << l.refused;
+  }
+}
+
+// Each axis has a loop of its own: kd > kp·lag without delay (Routh), with a lag of 0.05 s.
+TEST(Limits, OfStabilityHoldForEachAxis) {
+  const auto error = [](const char* kd) { return error_with(load_vehicle, "quad-5in.vehicle.toml", "kd", kd); };
+  EXPECT_EQ(error("{ horizontal = 0.501, vertical = 0.601 }"), "");
+  EXPECT_NE(error("{ horizontal = 0.499, vertical = 6.0 }").find("unstable"), std::string::npos);
+  EXPECT_NE(error("{ horizontal = 5.5, vertical = 0.599 }").find("unstable"), std::string::npos);
+}
+
+TEST(Limits, OfAnEffectEndWhereTheyAreSaidTo) {
+  const auto error = [](const std::string& effect) {
+    const std::string path = testing::TempDir() + "backwash_limits_test_" + std::to_string(getpid()) + ".toml";
+    std::ofstream(path) << shipped("quad-5in.model.toml")
+                        << "\n[[extension.term]]\ncause = 'wall'\neffect = [{ kind = " << effect << " }]\n";
+    const auto read = load_model(path);
+    std::filesystem::remove(path);
+    return read ? std::string() : read.error().message;
+  };
+  EXPECT_EQ(error("'push_to_walls', value = [-10], error = [10], scale = 10"), "");
+  EXPECT_EQ(error("'push_to_walls', value = [10], error = [0], scale = 0.01"), "");
+  for (const char* wrong : {"'push_to_walls', value = [10.1], error = [0], scale = 1",
+                            "'push_to_walls', value = [-10.1], error = [0], scale = 1",
+                            "'push_to_walls', value = [1], error = [10.1], scale = 1",
+                            "'push_to_walls', value = [1, 1], error = [0], scale = 1",
+                            "'push_to_walls', value = [1], error = [0, 0], scale = 1",
+                            "'push_to_walls', value = [1], error = [0], scale = 10.1",
+                            "'push_to_walls', value = [1], error = [0], scale = 0.009"})
+    EXPECT_NE(error(wrong).find("needs a"), std::string::npos) << wrong;
+}
+
+TEST(DaemonFile, BelievesADeclaredMapper) {
+  for (const bool live : {true, false}) {
+    std::string text = shipped("backwashd.daemon.toml");
+    text.replace(text.find("live = false"), 12, live ? "live = true" : "live = false");
+    const std::string path = testing::TempDir() + "backwash_limits_test_" + std::to_string(getpid()) + ".toml";
+    std::ofstream(path) << text;
+    const auto read = load_daemon(path);
+    std::filesystem::remove(path);
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->map.live, live);
+  }
 }
 
 }  // namespace

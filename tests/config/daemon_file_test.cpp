@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "core/config/daemon_config.hpp"
+#include "tests/config/file_texts.hpp"
 
 namespace backwash::config {
 namespace {
@@ -298,6 +300,54 @@ TEST(DaemonFile, RefusesTextThatWouldSteerATerminalOrCutAPath) {
   for (const char* bad : {"/dev/tty\\u0000x", "/dev/\\u001b[2J"})
     EXPECT_THAT(error_after("/dev/ttyAMA0", bad),
                 testing::AllOf(HasSubstr(".toml:15: key 'link.device'"), testing::Not(HasSubstr("\x1b"))));
+}
+
+/// The shipped file with these lines before its [link].
+tl::expected<Daemon, ConfigError> with_lines(const std::string& lines) {
+  std::string text = config::shipped("backwashd.daemon.toml");
+  text.insert(text.find("[link]"), lines);
+  return load_daemon(TemporaryFile(text).path);
+}
+
+TEST(DaemonFile, CredentialsMayBeLeftOutOrHaveAFolder) {
+  EXPECT_EQ(with_lines("").value().dds.security, "");
+  EXPECT_EQ(with_lines("security = \"/etc/backwash/security\"\n").value().dds.security, "/etc/backwash/security");
+  for (const std::string bad : {"\"\"", "true", "7", "\"/etc\\u001b[2J\""}) {
+    const auto refused = with_lines("security = " + bad + "\n");
+    ASSERT_FALSE(refused) << bad;
+    EXPECT_THAT(refused.error().message, testing::HasSubstr(".toml:14: key 'dds.security' = ")) << bad;
+  }
+}
+
+// dds.tf of the daemon's configuration: which transforms it sends.
+
+/// The shipped file with these texts replaced.
+tl::expected<Daemon, ConfigError> changed(std::initializer_list<std::pair<std::string_view, std::string>> texts) {
+  std::string text = config::shipped("backwashd.daemon.toml");
+  for (const auto& [from, to] : texts) {
+    EXPECT_NE(text.find(from), text.npos) << from;
+    text.replace(text.find(from), from.size(), to);
+  }
+  return load_daemon(TemporaryFile(text).path);
+}
+
+TEST(DaemonTransforms, AreSentWhereTheyAreAskedForAndNobodyElseSendsThem) {
+  EXPECT_EQ(load_daemon("builtin:backwashd")->dds.tf, Transforms::none);
+  const std::pair<std::string, Transforms> all[] = {
+      {"none", Transforms::none}, {"map", Transforms::map}, {"vehicle", Transforms::vehicle}};
+  for (const auto& [text, tf] : all) {
+    const std::pair<std::string_view, std::string> asked{"domain = 0", "domain = 0\ntf = \"" + text + "\""};
+    const auto read = changed({asked});
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->dds.tf, tf);
+    const auto heard = changed({asked, {"profile = \"ros\"", "profile = \"custom\"\nmessage = \"tf\""}});
+    EXPECT_EQ(heard.has_value(), tf == Transforms::none) << text;
+    if (heard) continue;
+    EXPECT_THAT(heard.error().message, testing::HasSubstr("with odometry.message = \"tf\" others send them"));
+  }
+  const auto other = changed({{"domain = 0", "domain = 0\ntf = \"odom\""}});
+  ASSERT_FALSE(other);
+  EXPECT_THAT(other.error().message, testing::AllOf(testing::HasSubstr("'dds.tf'"), testing::HasSubstr("\"vehicle\"")));
 }
 
 }  // namespace

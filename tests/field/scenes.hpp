@@ -91,4 +91,12 @@ inline OccupancyGrid turned_room(double angle, double a, double height = 1.5) {
   return grid;
 }
 
+/// Numbers of the free voxels, ascending.
+inline std::vector<std::size_t> free_voxels(const OccupancyGrid& grid) {
+  std::vector<std::size_t> voxels;
+  for (std::size_t n = 0; n < grid.cell_count(); ++n)
+    if (grid.at(n) == Cell::free) voxels.push_back(n);
+  return voxels;
+}
+
 }  // namespace backwash::scene

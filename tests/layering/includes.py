@@ -59,7 +59,7 @@ MAY = {
 }
 # The worlds with hidden effects share no code with what looks for them. These ask the study, and no world includes them.
 ASKS_THE_STUDY = {"design_main", "design_trial", "matrix", "null_size", "observe", "oracle", "score", "shares", "shares_main", "simulation",
-                  "simulation_main", "summary", "weights"}
+                  "simulation_main", "summary"}
 # DDS with what idl/ generates, MAVLink, GPIO and sockets, systemd, threads with all that only threads need; core/sync has <atomic>.
 FORBIDDEN = re.compile(r"(\w+/)*(dds|gpio|systemd|mavlink|c?thread|pthread|jthread|s?mutex|shared_mutex|future|condition_variable|"
                        r"semaphore|barrier|latch|stop_token|execution|omp\.h|tbb|termios|ros2\.h|backwash_msgs|assimp|liblzf|lz4|zstd)|sys/socket|netinet/|linux/")

@@ -63,15 +63,4 @@ inline bool has_known_cells(const OccupancyGrid& grid) {
   return std::ranges::any_of(grid.cells(), [](Cell c) { return c != Cell::unknown; });
 }
 
-/// One to four bits of a random part of `bytes` turned over; every other one hits the top of the tree or the header,
-/// where it hurts most.
-template <class Container>
-Container damaged(Container bytes, std::mt19937_64& random) {
-  for (auto flips = 1 + random() % 4; flips > 0; --flips) {
-    const auto at = random() % (random() % 2 ? bytes.size() : std::min<std::size_t>(bytes.size(), 200));
-    bytes[at] = static_cast<typename Container::value_type>(bytes[at] ^ (1 << random() % 8));
-  }
-  return bytes;
-}
-
 }  // namespace backwash::map

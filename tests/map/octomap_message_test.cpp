@@ -128,28 +128,5 @@ TEST(OctomapMessage, HoldsTheCapToTheByte) {
   EXPECT_FALSE(decode_octomap(data, 0.1, true, "OcTree", 6000 * sizeof(Cell) - 1));
 }
 
-TEST(OctomapMessage, SurvivesTruncationAndDamage) {
-  constexpr std::size_t kCap = 1U << 20;
-  std::mt19937_64 random(6);
-  const auto tree = tree_of(builtin_scene("narrow-gap", 0.2).value());
-  for (const bool binary : {true, false}) {
-    std::stringstream stream;
-    binary ? tree.writeBinaryData(stream) : tree.writeData(stream);
-    const Bytes data = bytes_of(stream);
-    for (std::size_t length = 0; length < data.size(); ++length) {
-      ASSERT_FALSE(decode_octomap(std::span(data).first(length), 0.2, binary, "OcTree")) << length;
-    }
-    int refused = 0;
-    for (int round = 0; round < 1000; ++round) {
-      const auto grid = decode_octomap(damaged(data, random), 0.2, binary, "OcTree", kCap);
-      refused += !grid;
-      if (grid) {
-        ASSERT_LE(grid->cell_count() * sizeof(Cell), kCap);
-      }
-    }
-    EXPECT_GT(refused, 100);
-  }
-}
-
 }  // namespace
 }  // namespace backwash::map

@@ -120,30 +120,6 @@ TEST(AirScale, WhatWasLearntWithoutAClassCountsForAll) {
     EXPECT_EQ(none->bounds.at(none->grid.voxel(n)).w, all->bounds.at(all->grid.voxel(n)).w);
 }
 
-// A scan in rough air must not bring the model's bounds back.
-TEST(AirScale, AChangedMapKeepsFactorsAndClassesAsIfItHadBeenBuiltWithThem) {
-  const auto old = rebuilt(*as_modelled(), {.air = kRougher});
-  map::OccupancyGrid grid = old->grid;
-  map::VoxelBox changed;
-  for (const Vec3& p : {Vec3(0.9, 0.9, 0.5), Vec3(1.1, 1.1, 1.1)}) {
-    const Index3 v = grid.index(p);
-    ASSERT_TRUE(grid.free(v));
-    grid.set(v, map::Cell::occupied);
-    changed.add(v);
-  }
-  const auto updated = rebuilt(*old, {.grid = grid, .voxels = changed});
-  const auto whole = rebuilt(*build_world(grid, Model{}, quad()), {.air = kRougher});
-  EXPECT_EQ(updated->air.factors, kRougher);
-  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
-    const Index3 v = grid.voxel(n);
-    ASSERT_EQ(updated->bounds.at(v).w, whole->bounds.at(v).w) << v.transpose();
-    ASSERT_EQ(updated->hover.safe(v), whole->hover.safe(v)) << v.transpose();
-    if (whole->air.sigma->has(v)) {
-      ASSERT_EQ(updated->air.classes[n], whole->air.classes[n]) << v.transpose();
-    }
-  }
-}
-
 TEST(AirScale, APlaceHasTheModelsVarianceAndNoneBeyondTheMap) {
   const auto world = rebuilt(*as_modelled(), {.air = kRougher});
   const Vec3 p = world->grid.center(world->grid.index({-2, 0, 1.2}));

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/plan/world/world.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <memory>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
+#include "core/plan/search/components.hpp"
+#include "core/plan/world/world.hpp"
 
 namespace backwash::plan {
 namespace {
@@ -258,6 +262,147 @@ TEST(World, OfAPartSaysWhatTheWholeOneSaysThere) {
   }
   EXPECT_GT(safe, 2000u);
   EXPECT_GT(elsewhere, 200u);  // at the part's sides, which count as obstacles
+}
+
+// Worlds in which what is unknown below free voxels is taken for a floor (Model::unknown_floor).
+
+using map::Cell;
+using map::OccupancyGrid;
+
+const AirFactors kFloorRougher{3, 2, 4, 1, 1};
+
+Vehicle quad_5in() { return config::load_vehicle("builtin:quad-5in").value(); }
+Model floor_model() {
+  Model model;
+  model.unknown_floor = true;
+  return model;
+}
+
+// Where the lowest layer is free, too: what is below a map is as unknown as what is in it.
+TEST(UnknownFloor, BelowTheLowestLayerOfAMapAFloorMayBeAsWell) {
+  OccupancyGrid cut(Vec3::Zero(), 0.2, Index3(20, 20, 8), Cell::free);
+  OccupancyGrid whole({0, 0, -0.2}, 0.2, Index3(20, 20, 9), Cell::free);
+  for (int n = 0; n < 400; ++n) whole.set({n % 20, n / 20, 0}, Cell::unknown);
+  for (const bool rougher : {false, true}) {
+    const auto made = [&](const OccupancyGrid& grid, const Model& model) {
+      auto world = build_world(grid, model, quad_5in());
+      return rougher ? rebuilt(*world, {.air = kFloorRougher}) : world;
+    };
+    const auto of_cut = made(cut, floor_model()), of_whole = made(whole, floor_model()), without = made(cut, Model{});
+    for (std::size_t n = 0; n < cut.cell_count(); ++n) {
+      const Index3 v = cut.voxel(n), w = v + Index3::UnitZ();
+      ASSERT_EQ(of_cut->bounds.at(v).w, of_whole->bounds.at(w).w) << v.transpose();
+      if (!rougher) continue;
+      ASSERT_EQ(of_cut->air.classes[n], of_whole->air.classes[whole.linear(w)]) << v.transpose();
+    }
+    const Index3 low(10, 10, 2);
+    EXPECT_GT(of_cut->bounds.at(low).w[kZ], 2 * without->bounds.at(low).w[kZ]);
+  }
+}
+
+// What was learnt over a floor counts over one that is only taken for it: class and bounds are those of a known floor.
+TEST(UnknownFloor, InLearntAirIsTheGroundThatAKnownOneIs) {
+  OccupancyGrid known(Vec3::Zero(), 0.2, Index3(30, 30, 10), Cell::free), unknown = known;
+  for (int n = 0; n < 900; ++n) {
+    known.set({n % 30, n / 30, 0}, Cell::occupied);
+    unknown.set({n % 30, n / 30, 0}, Cell::unknown);
+  }
+  const auto learnt = [](const OccupancyGrid& grid) {
+    return rebuilt(*build_world(grid, floor_model(), quad_5in()), {.air = AirFactors{1, 2, 1, 1, 1}});
+  };
+  const auto over_known = learnt(known), over_unknown = learnt(unknown);
+  std::size_t ground = 0;
+  for (int k = 2; k < 8; ++k) {
+    const Index3 v(15, 15, k);
+    const AirClass air = over_known->air.classes[known.linear(v)];
+    ground += air == AirClass::ground;
+    EXPECT_EQ(over_unknown->air.classes[unknown.linear(v)], air) << k;
+    EXPECT_EQ(over_unknown->bounds.at(v).w, over_known->bounds.at(v).w) << k;
+  }
+  EXPECT_GT(ground, 1u);
+}
+
+using map::Cell;
+using map::OccupancyGrid;
+
+/// Numbers from a flood over shared faces, 0 where a voxel is not free.
+std::vector<int> flooded(const OccupancyGrid& grid) {
+  std::vector<int> number(grid.cell_count(), 0);
+  int last = 0;
+  for (std::size_t seed = 0; seed < grid.cell_count(); ++seed) {
+    if (number[seed] || grid.at(seed) != Cell::free) continue;
+    std::vector<Index3> front{grid.voxel(seed)};
+    number[seed] = ++last;
+    while (!front.empty()) {
+      const Index3 v = front.back();
+      front.pop_back();
+      for (const Index3& step :
+           {Index3(1, 0, 0), Index3(-1, 0, 0), Index3(0, 1, 0), Index3(0, -1, 0), Index3(0, 0, 1), Index3(0, 0, -1)}) {
+        const Index3 u = v + step;
+        if (!grid.free(u) || number[grid.linear(u)]) continue;
+        number[grid.linear(u)] = last;
+        front.push_back(u);
+      }
+    }
+  }
+  return number;
+}
+
+/// Both number the same partition of the free voxels.
+void expect_same(const Components& components, const OccupancyGrid& grid) {
+  const std::vector<int> number = flooded(grid);
+  std::map<int, std::uint32_t> there;
+  std::map<std::uint32_t, int> back;
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    const std::uint32_t component = components.of(grid.voxel(n));
+    ASSERT_EQ(component == Components::kNone, number[n] == 0);
+    ASSERT_EQ(components.free(grid.voxel(n)), number[n] != 0);
+    if (!number[n]) continue;
+    ASSERT_EQ(there.emplace(number[n], component).first->second, component) << grid.voxel(n).transpose();
+    ASSERT_EQ(back.emplace(component, number[n]).first->second, number[n]) << grid.voxel(n).transpose();
+  }
+}
+
+/// Walls with few holes: components that wind through many tiles, are joined by one voxel and parted by another.
+OccupancyGrid maze(std::mt19937& random, const Index3& size) {
+  OccupancyGrid grid({0, 0, 0}, 0.1, size, Cell::free);
+  for (std::size_t n = 0; n < grid.cell_count(); ++n) {
+    const Index3 v = grid.voxel(n);
+    const bool wall = v.x() % 7 == 3 || v.y() % 9 == 4 || v.z() % 11 == 5;
+    if (wall && random() % 60) grid.set(v, random() % 2 ? Cell::occupied : Cell::unknown);
+  }
+  return grid;
+}
+
+TEST(Components, AreThoseOfAFlood) {
+  std::mt19937 random(1);
+  for (const Index3& size : {Index3(40, 35, 33), Index3(16, 16, 16), Index3(17, 3, 50), Index3(1, 1, 1)})
+    for (int trial = 0; trial < 4; ++trial) {
+      const OccupancyGrid grid = maze(random, size);
+      expect_same(Components(grid), grid);
+    }
+}
+
+TEST(Components, FollowWhatJoinsAndPartsThemAndLeaveCopiesAsTheyWere) {
+  std::mt19937 random(2);
+  OccupancyGrid grid = maze(random, {45, 40, 36});
+  Components components(grid);
+  for (int round = 0; round < 120; ++round) {
+    const OccupancyGrid before = grid;
+    const Components old = components;
+    map::VoxelBox changed;
+    const int apart = round % 2 ? 45 : 3;  // a change far and wide, or in a tile or two
+    const Index3 low = grid.voxel(random() % grid.cell_count());
+    const auto draw = [&] { return static_cast<int>(random() % static_cast<unsigned>(apart)); };
+    for (int n = 0; n < 4; ++n) {
+      const Index3 v = (low + Index3(draw(), draw(), draw())).cwiseMin(grid.size() - Index3::Ones());
+      grid.set(v, grid.free(v) ? Cell::occupied : Cell::free);
+      changed.add(v);
+    }
+    components.update(grid, changed);
+    expect_same(components, grid);
+    expect_same(old, before);
+  }
 }
 
 }  // namespace

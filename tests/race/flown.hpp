@@ -18,7 +18,7 @@ namespace backwash::race {
 inline constexpr int kSteps = 4;          ///< of integration, a control period
 inline constexpr double kLattice = 0.05;  ///< m: the flow is cast at the nearest point of it; 0: where the vehicle is
 
-/// A vehicle in rough air, as core/sim/closed_loop flies it but in larger steps: `race equal` compares.
+/// A vehicle in rough air, as core/sim/closed_loop flies it but in larger steps.
 /// VIO: drift of 3/4 of estimation.position at most, noise for the rest at each tick, 0.01 m/s on the velocity.
 class Flown {
  public:

@@ -12,7 +12,7 @@ int usage() {
   std::fprintf(
       stderr,
       "usage: race fly|draw|count FILE ROUNDS PAIRS [MAP [VEHICLE]] | sieve FILE FOLDER|places | factors FOLDER | "
-      "real FOLDER | equal | calibrated\n");
+      "real FOLDER\n");
   return 64;
 }
 
@@ -30,7 +30,5 @@ int main(int argc, char** argv) {
   if (verb == "sieve" && argc == 4) return sieve(argv[2], argv[3]);
   if (verb == "factors" && argc == 3) return print_factors(argv[2]);
   if (verb == "real" && argc == 3) return judge_real_flights(argv[2]);
-  if (verb == "equal" && argc == 2) return compare_steps();
-  if (verb == "calibrated" && argc == 2) return print_calibrations();
   return usage();
 }

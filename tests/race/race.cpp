@@ -133,18 +133,4 @@ int fly_all(const std::string& file, std::size_t rounds, std::size_t pairs, cons
   return 0;
 }
 
-int print_calibrations() {
-  std::printf("vehicle,air,factor,mean_horizontal,mean_vertical,kappa of 1e-2,1e-3\n");
-  for (const auto& vehicle : population()) {
-    const auto reach = plan::sets_of(vehicle, reach::Method::tight);
-    for (const double air : kAirs) {
-      const Calibrated c = calibrated(vehicle, air);
-      std::printf("%s,%g,%.3f,%.3f,%.3f,%.2f,%.2f\n", vehicle.name.c_str(), air, c.factor, c.bound.mean_horizontal,
-                  c.bound.mean_vertical, reach::kappa_of(reach, c.bound.tau_w, 1e-2, 0.05),
-                  reach::kappa_of(reach, c.bound.tau_w, 1e-3, 0.05));
-    }
-  }
-  return 0;
-}
-
 }  // namespace backwash::race

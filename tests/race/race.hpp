@@ -28,11 +28,4 @@ int print_factors(const std::string& folder);
 /// motion that a loop fitted to the other flights predicts. Hovers without set-points: about the mean of two seconds.
 int judge_real_flights(const std::string& folder);
 
-/// What each vehicle's hover flights said of each air.
-int print_calibrations();
-
-/// Whether the larger steps of flown.hpp fly as core/sim does: deviations of the error and contacts by core/sim, by
-/// steps of 1 ms and as raced.
-int compare_steps();
-
 }  // namespace backwash::race

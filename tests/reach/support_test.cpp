@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/reach/support.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
+#include "core/reach/response/delay_recursion.hpp"
+#include "core/reach/support.hpp"
 #include "tests/reach/axis_rollouts.hpp"
 
 namespace backwash::reach {
@@ -204,6 +205,182 @@ TEST(SupportRecursion, IntervalIsTheLargestSupportWithinHalfAPerCent) {
       }
       ASSERT_GE(tube.until_next[k][kX], largest * (1 - 1e-7)) << name(c) << " step " << k;
       ASSERT_LE(tube.until_next[k][kX], largest * 1.005) << name(c) << " step " << k;
+    }
+  }
+}
+
+// Supports that are summed from a loop's table of responses: beyond its end, and by axis and direction.
+
+using Batch = AxisRollouts::Batch;
+
+TEST(SupportRecursion, BeyondTheTableTheTailKeepsTheSumCovered) {
+  Vehicle vehicle;
+  vehicle.controller.attitude_lag = 0.05;  // a loop that the FIR serves
+  vehicle.controller.kp = {20, 20};
+  vehicle.controller.kd = {4, 4};
+  const AxisLoop axis = axis_loop(vehicle, false, Loop::vehicle);
+  const AxisResponse response = axis_response(axis, Loop::vehicle);
+  SupportRecursion support(response, response, vehicle);
+  DisturbanceBound b;
+  b.w.fill(2);
+  const std::size_t N = response.G.size();
+  for (std::size_t k = 0; k < 3 * N + 5; ++k) {
+    support.step(b);
+    const double least = 2 * response.P[std::min(k + 1, N) * AxisResponse::kPhases];
+    ASSERT_GE(support.half_widths()[kX], least - 1e-14);
+    ASSERT_LE(support.half_widths()[kX], least + 2 * response.tail + 1e-14);
+    ASSERT_EQ(support.half_widths()[kX], support.half_widths()[kXyMinus]);
+  }
+  // A storm in the past: what is left of it is never forgotten altogether.
+  for (std::size_t k = 0; k < N + 3; ++k) support.step(DisturbanceBound{});
+  EXPECT_GT(support.half_widths()[kZ], 0);
+  EXPECT_LE(support.half_widths()[kZ], 2 * response.tail);
+}
+
+TEST(SupportRecursion, BeyondTheTableTheFirstErrorsAreStillCovered) {
+  Vehicle vehicle;
+  vehicle.controller.attitude_lag = 0.05;
+  vehicle.controller.feedback_delay = 0;
+  vehicle.controller.kp = {20, 20};
+  vehicle.controller.kd = {4, 4};
+  const AxisLoop axis = axis_loop(vehicle, false, Loop::vehicle);
+  const AxisResponse response = axis_response(axis, Loop::vehicle);
+  for (const auto& [position, velocity] : {std::pair(1.0, 0.0), std::pair(0.0, 1.0)}) {
+    vehicle.initial_error = {position, velocity};
+    SupportRecursion support(response, response, vehicle);
+    AxisRollouts e(axis, false, kRolloutStep, Batch{{position}}, Batch{{velocity}});
+    for (std::size_t k = 0; k < response.G.size() + 40; ++k) {
+      support.step(DisturbanceBound{});
+      for (int i = 0; i < kRolloutSteps; ++i) e.step(Batch{{0.0}});
+      ASSERT_GE(support.half_widths()[kX], (1 - 1e-3) * std::abs(e.p()[0])) << "step " << k;
+    }
+  }
+}
+
+TEST(SupportRecursion, AxesAndDirectionsAreTheirOwn) {
+  Vehicle vehicle;
+  vehicle.controller.kp = {6, 16};
+  vehicle.controller.kd = {4, 8};
+  const AxisResponse horizontal = axis_response(axis_loop(vehicle, false, Loop::continuous), Loop::continuous);
+  const AxisResponse vertical = axis_response(axis_loop(vehicle, true, Loop::continuous), Loop::continuous);
+  SupportRecursion support(horizontal, vertical, vehicle);
+  const DisturbanceBound b{{0.5, 1, 2, 3, 4}};
+  for (int k = 0; k < 400; ++k) support.step(b);
+  const PerDirection h = support.half_widths();
+  const double closed_form = 0.170633990;  // (6, 4), see AxisResponse.HoverHalfWidthIsTheClosedForm
+  EXPECT_NEAR(h[kX], 0.5 * closed_form, 1e-6);
+  EXPECT_NEAR(h[kY], closed_form, 1e-6);
+  EXPECT_NEAR(h[kXyPlus], 3 * closed_form, 1e-6);
+  EXPECT_NEAR(h[kXyMinus], 4 * closed_form, 1e-6);
+  EXPECT_NEAR(h[kZ], 2.0 / 16, 1e-6);
+}
+
+// The impulse response of the second-order loop, from its characteristic roots.
+double impulse_response(double kp, double kd, double t) {
+  const double sigma = kd / 2, under_root = kp - sigma * sigma;
+  if (under_root > 0) return std::exp(-sigma * t) * std::sin(std::sqrt(under_root) * t) / std::sqrt(under_root);
+  if (under_root == 0) return t * std::exp(-sigma * t);
+  const double s = std::sqrt(-under_root);
+  return (std::exp((s - sigma) * t) - std::exp(-(s + sigma) * t)) / (2 * s);
+}
+
+// ∫ |g| over each step, Simpson's rule on 2000 pieces.
+std::vector<double> step_shares(double kp, double kd, std::size_t steps) {
+  constexpr int kPieces = 2000;
+  std::vector<double> G(steps);
+  for (std::size_t j = 0; j < steps; ++j)
+    for (int i = 0; i < kPieces; ++i) {
+      const double h = kControlPeriod / kPieces, t = static_cast<double>(j) * kControlPeriod + h * i;
+      const auto g = [&](double at) { return std::abs(impulse_response(kp, kd, at)); };
+      G[j] += h / 6 * (g(t) + 4 * g(t + h / 2) + g(t + h));
+    }
+  return G;
+}
+
+std::vector<double> random_bounds(std::size_t count, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<double> w(count);
+  for (double& x : w) x = uniform(random) < 0.3 ? 0 : 3 * uniform(random);
+  return w;
+}
+
+AxisResponse fir_only(AxisResponse response) {
+  response.delay.reset();
+  return response;
+}
+
+TEST(DelayRecursion, IsTheConvolutionWithTheAbsoluteImpulseResponse) {
+  constexpr std::size_t kSteps = 700;
+  for (const auto& [kp, kd] : kGainSets) {
+    SCOPED_TRACE(testing::Message() << kp << " " << kd);
+    const AxisResponse response = axis_response({kp, kd, 0, 0}, Loop::continuous);
+    ASSERT_TRUE(response.delay);
+    EXPECT_EQ(response.delay->echoes.empty(), kd * kd >= 4 * kp);
+    EXPECT_LE(response.delay->tail, 1e-6 * response.h_inf);
+    const std::vector<double> G = step_shares(kp, kd, kSteps), w = random_bounds(kSteps, 5);
+    SupportFilter<1> filter(response);
+    for (std::size_t k = 1; k < kSteps; ++k) {
+      const double sum = filter.push({w[k - 1]})[0];  // at (k + 1) dt, without step k
+      double exact = 0;
+      for (std::size_t j = 0; j < k; ++j) exact += w[j] * G[k - j];
+      ASSERT_NEAR(sum, exact, filter.tail()[0] + 1e-9 * exact + 1e-13) << k;
+      ASSERT_GE(sum + filter.tail()[0], exact - 1e-9 * exact) << k;
+      if (static_cast<double>(k) * kControlPeriod < 1) {  // before any tail
+        ASSERT_NEAR(sum, exact, 1e-9 * exact + 1e-13) << k;
+      }
+    }
+  }
+}
+
+// The tail is needed: of pushes during the one half oscillation after the last echo, the truncated sum has the sign
+// wrong.
+TEST(DelayRecursion, TailCoversTheEchoesLeftOutAndLittleMore) {
+  const AxisResponse response = axis_response({20, 4, 0, 0}, Loop::continuous);
+  const double T = std::numbers::pi / 4;  // ω = 4
+  const auto M = static_cast<double>(response.delay->echoes.size());
+  const auto steps = static_cast<std::size_t>((M + 3) * T / kControlPeriod);
+  const std::vector<double> G = step_shares(20, 4, steps + 1);
+  SupportFilter<1> filter(response);
+  double sum = 0, exact = 0;
+  for (std::size_t k = 0; k < steps; ++k) {
+    const double age = static_cast<double>(steps - k) * kControlPeriod;
+    const double w = age >= (M + 1) * T && age + kControlPeriod <= (M + 2) * T ? 1 : 0;
+    sum = filter.push({w})[0];
+    exact += w * G[steps - k];
+  }
+  EXPECT_LE(exact - sum, response.delay->tail);
+  EXPECT_GE(exact - sum, 0.5 * response.delay->tail);
+  EXPECT_EQ(filter.tail()[0], response.delay->tail);
+}
+
+TEST(DelayRecursion, LeavesBarelyDampedAndVeryFastLoopsToTheFir) {
+  EXPECT_TRUE(delay_recursion(20, 4));        // ζ = 0.45
+  EXPECT_FALSE(delay_recursion(20, 1));       // ζ = 0.11
+  EXPECT_FALSE(delay_recursion(40000, 200));  // half an oscillation in 18 ms
+  EXPECT_TRUE(delay_recursion(16, 8)->echoes.empty());
+  EXPECT_FALSE(axis_response({6, 4, 0, 0.05}, Loop::vehicle).delay);
+  EXPECT_FALSE(axis_response({6, 4, 0.03, 0}, Loop::vehicle).delay);
+  EXPECT_FALSE(axis_response({6, 4, 0, 0}, Loop::sampled).delay);
+}
+
+TEST(DelayRecursion, GivesTheSetsOfTheFir) {
+  Vehicle vehicle;
+  vehicle.initial_error.position = 0.02;
+  vehicle.initial_error.velocity = 0.05;
+  for (const auto& [kp, kd] : kGainSets) {
+    const AxisResponse recursion = axis_response({kp, kd, 0, 0}, Loop::continuous), fir = fir_only(recursion);
+    SupportRecursion a(recursion, recursion, vehicle), b(fir, fir, vehicle);
+    const std::vector<double> w = random_bounds(2000, 9);
+    for (std::size_t k = 0; k + 5 < w.size(); ++k) {
+      const DisturbanceBound bound{{w[k], w[k + 1], w[k + 2], w[k + 3], w[k + 4]}};
+      a.step(bound);
+      b.step(bound);
+      for (std::size_t d = 0; d < kDirections; ++d) {
+        const double slack = 3 * (recursion.delay->tail + recursion.tail) + 1e-9 * b.half_widths()[d];
+        ASSERT_NEAR(a.half_widths()[d], b.half_widths()[d], slack) << kp << " " << kd << " " << k;
+        ASSERT_NEAR(a.half_widths_until_next(bound)[d], b.half_widths_until_next(bound)[d], slack);
+      }
     }
   }
 }

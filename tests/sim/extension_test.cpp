@@ -209,30 +209,5 @@ TEST(ExtendedModel, EffectsOfNothingLeaveEveryTubeAndSetAsWithoutThem) {
     ASSERT_EQ(plain->hover.safe(plain->grid.voxel(n)), zero->hover.safe(zero->grid.voxel(n)));
 }
 
-TEST(ExtendedModel, AnUpdatedWorldEqualsOneBuiltAnew) {
-  Model model;
-  model.extension = {kSuction, kPull, effect(Law::ln_variance_under_surface, {0.5, 0, 0}, 0.3)};
-  const auto before = plan::build_world(room(), model, vehicle());
-  map::OccupancyGrid changed = room();
-  map::VoxelBox box;
-  for (int i = 10; i < 14; ++i)
-    for (int k = 12; k < 16; ++k) {
-      changed.set({i, 22, k}, map::Cell::occupied);
-      box.add({i, 22, k});
-    }
-  const auto anew = plan::build_world(changed, model, vehicle());
-  const auto updated = plan::rebuilt(*before, {.grid = changed, .voxels = box});
-  int moved = 0;
-  for (std::size_t n = 0; n < anew->grid.cell_count(); ++n) {
-    const Index3 v = anew->grid.voxel(n);
-    ASSERT_EQ(updated->bounds.at(v).w, anew->bounds.at(v).w);
-    ASSERT_EQ(updated->hover.safe(v), anew->hover.safe(v));
-    if (!(anew->bounds.at(v).w[kZ] > 0)) continue;
-    ASSERT_EQ(updated->bounds.extension().at(v).push_W, anew->bounds.extension().at(v).push_W);
-    moved += anew->bounds.extension().at(v).push_W != before->bounds.extension().at(v).push_W;
-  }
-  EXPECT_GT(moved, 100);
-}
-
 }  // namespace
 }  // namespace backwash

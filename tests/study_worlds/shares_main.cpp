@@ -8,15 +8,13 @@
 #include "services/command_line/command_line.hpp"
 #include "tests/study_worlds/in_parallel.hpp"
 #include "tests/study_worlds/shares.hpp"
-#include "tests/study_worlds/weights.hpp"
 
 namespace {
 
 using namespace study_worlds;
 
 /// Scores every trial of every world on `jobs` threads, worlds outside: a cut run has as many of each trial.
-template <typename Trial>
-auto run(const std::vector<Trial>& trials, std::uint64_t seed, int worlds, int jobs, std::ostream& lines) {
+auto run(const std::vector<SharedFault>& trials, std::uint64_t seed, int worlds, int jobs, std::ostream& lines) {
   std::vector<decltype(score(trials.front(), seed, {}))> outcomes;
   std::mutex writing;
   in_parallel(jobs, trials.size() * static_cast<std::size_t>(worlds), [&](std::size_t k, auto& folder) {
@@ -26,15 +24,6 @@ auto run(const std::vector<Trial>& trials, std::uint64_t seed, int worlds, int j
     outcomes.push_back(std::move(outcome));
   });
   return outcomes;
-}
-
-/// Heavy weights near one rotor, damaged propellers and neither, on three craft.
-std::vector<RotorTrial> weights() {
-  std::vector<RotorTrial> all;
-  for (const char* craft : {"quad-5in", "quad-7in", "drawn"})
-    for (const char* hidden : {"weight", "propeller", "none"})
-      for (const bool reference : {false, true}) all.push_back({hidden, craft, reference});
-  return all;
 }
 
 }  // namespace
@@ -57,20 +46,13 @@ int main(int argc, char** argv) {
   app.add_option("--count", counts, "flights of 12");
   app.add_option("--size", size, "in units of the effect-size table").capture_default_str();
   app.add_option("--out", out, "JSON lines, appended to");
-  bool by_weight = false;
-  app.add_flag("--weights", by_weight, "instead: heavy weights near one rotor and damaged propellers, on three craft");
   if (const auto code = app.parse(argc, argv)) return *code;
   std::ofstream lines(out, std::ios::app);
-  std::string table;
-  if (by_weight) {
-    table = weights_table(run(weights(), seed, worlds, jobs, lines));
-  } else {
-    std::vector<SharedFault> trials;
-    for (const auto& fault : faults)
-      for (const auto& layout : layouts)
-        for (const int count : counts) trials.push_back({fault, count, layout, size});
-    table = shares_table(run(trials, seed, worlds, jobs, lines));
-  }
+  std::vector<SharedFault> trials;
+  for (const auto& fault : faults)
+    for (const auto& layout : layouts)
+      for (const int count : counts) trials.push_back({fault, count, layout, size});
+  const std::string table = shares_table(run(trials, seed, worlds, jobs, lines));
   std::printf("seed %llu, %d worlds a row\n\n%s", static_cast<unsigned long long>(seed), worlds, table.c_str());
   return 0;
 }

@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # STOP while a plan is under way (docs/faults.md row 39): goto, and STOP so many milliseconds later, from one station.
 # Once the STOP is acknowledged no set-point moves but on the verified stop that was under way, until a later command.
-#   attack_01_plan_overrides_stop.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --wire "$work/wire.csv"
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 enable

@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # A stranger sends commands as fast as they go (docs/faults.md rows 26 and 28) and so gets the lease. The operator's
 # STOPs are taken all the same, each of them; odometry is not starved; the raw log holds what was acted on and not the flood.
-#   attack_command_flood.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 enable

@@ -3,10 +3,7 @@
 # The disk does not answer while it commands, neither for the flight log nor for its own lines (docs/faults.md row 35):
 # commands are answered and the set-points go on at 50 Hz; what is lost is counted in the status and, once the disk answers,
 # in the log; and a disk that hangs does not keep the daemon from ending.
-#   attack_disk.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 now() { python3 -c 'import time; print(time.monotonic())'; }
 status() { timeout 10 "$bin/backwashctl" --domain "$domain" status --json >"$work/status.json" || { rm -f "$work/hangs"; die 'no status'; }; }
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --wire "$work/wire.csv"

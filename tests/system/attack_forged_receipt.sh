@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Another process answers each part of a map in the daemon's name: "it is in use". `backwashctl map` does not believe it, and says
 # why. Without that process the map is taken.
-#   attack_forged_receipt.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 printf 'after = "start"\n[[fault]]\nchannel = "map"\nkind = "off"\nfrom = 0\nuntil = 100000\n' >"$work/no_map.toml"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --faults "$work/no_map.toml"
 write_configuration builtin:quad-5in "$work/flight.bwlog"

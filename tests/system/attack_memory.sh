@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # There is no memory left while it commands (docs/faults.md row 50): the set-points end and nothing else follows, the
 # flight log is closed with the reason, and the daemon says it and exits with 70.
-#   attack_memory.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 # The map comes through the probe: the daemon listens to one writer of maps.
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --wire "$work/wire.csv" --namespace bench
 "$build/tests/dds_probe" "$domain" backwash mapper &

@@ -3,10 +3,7 @@
 # The daemon's terminal is attacked while it commands (docs/faults.md row 44): nobody reads its full pipe while a
 # participant's messages are refused at 1 kHz, then its signals come, then the pipe is closed. Commands are answered and the
 # set-points go on at 50 Hz, judged from the bytes that reached the flight controller.
-#   attack_terminal.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 now() { python3 -c 'import time; print(time.monotonic())'; }
 alive() { kill -0 "$daemon_pid" 2>/dev/null || die "$1 ended the daemon"; }
 status() { timeout 10 "$bin/backwashctl" --domain "$domain" status --json >"$work/status.json"; }

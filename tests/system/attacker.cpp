@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What an operator in a hurry and a VIO gone wrong send, for tests/system/attack_*.sh.
+// What an operator in a hurry and a stranger send, for tests/system/attack_*.sh.
 //   attacker DOMAIN send STEP …               STEP: VERB[=X,Y,Z] or +MILLISECONDS; no step waits for an answer. Each
 //                                             answer is a line: time (s, monotonic), verb, result, reason
 //   attacker DOMAIN flood SECONDS             commands of a stranger, as fast as they go
 //   attacker DOMAIN receipts SECONDS          answers each part of a map in the daemon's name: the map is in use
-//   attacker DOMAIN relay FROM TO WHAT VALUE X  odometry from one topic to another; as soon as the vehicle is beyond X,
-//                                             turn: by VALUE rad; velocity: VALUE m/s along the body's x axis
-#include <Eigen/Geometry>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -126,37 +123,6 @@ int forge_receipts(const dds::Participant& participant, double seconds) {
   return 0;
 }
 
-int relay(const dds::Participant& participant, const std::string& from, const std::string& to, const std::string& what,
-          double value, double x) {
-  dds::Reader<dds::Odometry> reader(participant, dds::TopicOf<dds::Odometry>::type(), from, dds::Delivery::latest);
-  dds::Writer<dds::Odometry> writer(participant, dds::TopicOf<dds::Odometry>::type(), to, dds::Delivery::latest);
-  dds::WaitSet waitset(participant);
-  waitset.add(reader);
-  bool wrong = false;
-  const Eigen::Quaterniond turn(Eigen::AngleAxisd(value, Eigen::Vector3d::UnitZ()));
-  for (;;) {
-    waitset.wait(0.1);
-    reader.take([&](const dds::Odometry& sample) {
-      dds::Odometry m = sample;
-      auto& p = m.pose.pose.position;
-      auto& q = m.pose.pose.orientation;
-      if (!wrong && p.x > x) {
-        wrong = true;
-        std::printf("%.6f wrong from here: %.3f %.3f %.3f\n", now_s(), p.x, p.y, p.z);
-        std::fflush(stdout);
-      }
-      if (wrong && what == "velocity") m.twist.twist.linear.x = value;
-      if (wrong && what == "turn") {
-        const Eigen::Vector3d turned = turn * Eigen::Vector3d(p.x, p.y, p.z);
-        const Eigen::Quaterniond attitude = turn * Eigen::Quaterniond(q.w, q.x, q.y, q.z);
-        p = {turned.x(), turned.y(), turned.z()};
-        q = {attitude.x(), attitude.y(), attitude.z(), attitude.w()};
-      }
-      writer.write(m);
-    });
-  }
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -166,7 +132,5 @@ int main(int argc, char** argv) {
   if (mode == "send") return send(participant, argc - 3, argv + 3);
   if (mode == "flood" && argc == 4) return flood(participant, std::atof(argv[3]));
   if (mode == "receipts" && argc == 4) return forge_receipts(participant, std::atof(argv[3]));
-  if (mode == "relay" && argc == 8)
-    return relay(participant, argv[3], argv[4], argv[5], std::atof(argv[6]), std::atof(argv[7]));
   return 64;
 }

@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # `backwashctl adaptation` with real processes: what is shown, orders that are done and told, a reset that is refused while
 # enabled, the file that a reset forgets in, the raw log that holds each order and is replayed; a daemon that learns nothing.
-#   daemon_adaptation.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 adaptation() { "$bin/backwashctl" --domain "$domain" adaptation "$@" 2>&1; }
 shows() { # shows EXPRESSION: of the JSON, within 2 s
   local shown

@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The preflight over the emulated controller: with PX4 parameters that are unsafe indoors each is named with what to do, and
 # nothing else is; with safe ones all is good.
-#   daemon_check.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 check() { # check NAME: the preflight's lines and its exit code, once the daemon has read all parameters
   sleep 7
   code=0

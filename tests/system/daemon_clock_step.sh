@@ -3,10 +3,7 @@
 # The wall clock really steps in flight (docs/faults.md row 30), as the daemon and its middleware see it: an hour
 # forward, two back, an hour forward, half a second apart (clock_shim.c). The flight reaches its goal, no sample is
 # rejected, and between two set-points passes no more time than what a stolen processor took.
-#   daemon_clock_step.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 step() { python3 -c 'import struct, sys; open(sys.argv[1], "r+b").write(struct.pack("<q", int(sys.argv[2])))' "$work/offset" "$1"; }
 truncate -s 8 "$work/offset"
 # The shim is the daemon's alone: the bench's clocks are a sender's.

@@ -1,10 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # What the ground station may ask for, with real processes: a take-off that is refused arms nothing, hold in flight stops on the way with every sample inside its set, and follow flies each leg of a file and turns where that says so.
-#   daemon_commands.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 refused() { # refused TEXT ARGUMENT …
   local text=$1
   shift

@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # A ROS 2 system beside the vehicle (crowd.cpp): a process of 1,500 endpoints of other topics, and one of eight participants with
 # 1,600. The last endpoint of each participant is one that the daemon wants; a station that joins then commands a flight.
-#   daemon_crowd.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 resident() { awk '/VmRSS/ { print $2 }' "/proc/$daemon_pid/status"; }

@@ -3,10 +3,7 @@
 # What other participants may do to a daemon, with real processes (docs/faults.md rows 7, 10 to 12, 27, 28, 48): two
 # vehicles in one domain, a foreign type, unknown frames, oversized clouds, corrupt and huge maps, maps of a second
 # writer; and the preflight.
-#   daemon_dds.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 status() { "$bin/backwashctl" --domain "$domain" --namespace "$1" status --json >"$work/$1.json"; }
 expect() { # expect NAMESPACE 'PYTHON EXPRESSION OVER s'
   status "$1"

@@ -3,10 +3,7 @@
 # Odometry as estimators really fill it (docs/faults.md row 53). A daemon that is told who it is flies: VINS-Fusion's twist is
 # in the frame of the pose, FAST-LIO's is zero, motion capture sends poses alone, others transforms among those of joints. One
 # that takes FAST-LIO for an estimator by the letter enables nothing.
-#   daemon_estimators.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/$1.json" 2>>"$log"; }
 
 # flies NAME TABLES OPTION …, of the bench: takes off and goes 3 m, every sample inside its set.

@@ -3,10 +3,7 @@
 # A foreign middleware as ROS 2 brings it: a Fast DDS process is the daemon's only odometry and reads its status. A second
 # one sends odometry that breaks off in the middle: counted, and nothing else (docs/faults.md row 27). Others send poses alone,
 # in each type that odometry.message names.
-#   daemon_fastdds.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
 # The bench's own odometry goes where nobody listens.
 start_daemon builtin:quad-5in "$work/flight.bwlog" rt/foreign/odometry

@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # RViz's goals (backwashctl goals): Fast DDS sends poses, the daemon flies to those that are goals. What is none is refused
 # by name and moves nothing. Between goals no session is held: another station's hold and land are done.
-#   daemon_goals.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --log "$work/truth.csv"
 start_daemon builtin:quad-5in "$work/flight.bwlog"
 enable

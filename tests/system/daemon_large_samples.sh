@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The largest allowed maps and clouds at their fastest (docs/faults.md row 46): how long odometry takes from its stamp
 # to its reception, and a command to its answer, during bursts of 3 s and in the silences between them, in one run.
-#   daemon_large_samples.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 bursts=3
 datagrams() { awk '/^Udp: [0-9]/ { print $2 }' /proc/net/snmp; } # that sockets here have read
 status() { "$bin/backwashctl" --domain "$domain" status --json >"$work/$1.json"; }

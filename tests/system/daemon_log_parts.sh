@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # A raw log in parts of 2 MiB: the daemon leaves each on the ground alone, a flight is in one of them, which `report` tells by itself, and
 # all together are replayed bit for bit; not one without those before it.
-#   daemon_log_parts.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 # part N: its file.
 part() { [[ $1 == 1 ]] && echo "$work/flight.bwlog" || echo "$work/flight-$1.bwlog"; }
 # wait_for N: until part N is there.

@@ -3,10 +3,7 @@
 # Credentials that were made before a topic was there (docs/faults.md row 29). What is only shown is left out: the daemon
 # says which topic and which command makes new credentials, flies, and sends the topics that are allowed. That command, as
 # the daemon said it, ends the warnings. Without the right to tell its status no daemon starts.
-#   daemon_old_credentials.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 keys=$work/keys
 credentials() { "$build/services/backwash" keys "$@" >>"$log" || die "backwash keys $*"; }
 install_credentials() { # under a name that is not the holder's, as on a vehicle

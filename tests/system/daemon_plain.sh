@@ -1,10 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # The daemon on the plain serial link: a controller that uses firmware_bridge/plain is enabled, takes off, hovers and lands.
-#   daemon_plain.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in
 "$build/tests/plain_controller" "$work/autopilot" "$work/plain" >"$work/controller" 2>>"$log" &
 controller=$!

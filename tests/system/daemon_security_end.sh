@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The daemon's own certificate ends in flight (docs/faults.md row 29): the middleware takes its participants away at that
 # second, and the flight ends as one whose odometry is lost: HOLD, LAND, on the ground. It was told at the start.
-#   daemon_security_end.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 credentials() { "$build/services/backwash" keys "$@" >>"$log"; }
 credentials init "$work/keys"
 credentials add "$work/keys" eyes --role vio

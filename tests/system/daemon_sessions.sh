@@ -4,10 +4,7 @@
 # and a second writer under the holder's name are refused, replays too; a repeat is answered again and not done again; an
 # old sequence number counts for nothing; an answer is its writer's; STOP is anybody's; a session ends with its process,
 # however that ends; of two daemons in one name space none is enabled.
-#   daemon_sessions.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 enable=1 disable=2 takeoff=3 hold=5 release=7 stop_now=8 # verbs of idl/backwash_msgs.idl
 
 # open NAME: a station's process, one writer; ask NAME COMMAND…: the answer to its command is in $answer.

@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # A timeline of faults in real time: the VIO stops in the air for good, and the daemon lands; the bench says what was
 # kept, and its exit code too.
-#   daemon_timeline.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 
 # The bench alone stands on the ground: one expectation is kept, the other is not.
 printf "after = 'start'\n[[expect]]\nwhat = 'landed'\nat = 1\n" >"$work/kept.toml"

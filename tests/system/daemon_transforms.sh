@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # dds.tf, as a tf2 listener of another middleware reads rt/tf: nothing unless it is asked for; "map" sends where a loop
 # closure has the estimator's frame, "vehicle" the body too, in the frame that it was told in, and not once it is not told.
-#   daemon_transforms.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 start_bench "$build/services" "$log" builtin:parallel-walls-4m -2,0,1.2 builtin:quad-5in --namespace elsewhere
 # shown TF SENT: the transforms that a daemon with dds.tf = TF sends while that is sent, in $work/seen.
 shown() {

@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # What reaches the door of `backwashctl serve` (page/requests.py): token, host, origin, method and size are asked for; garbage, slow clients
 # and floods of strangers (page/floods.py) neither end it nor keep a STOP away; it ends within 2 s. Without a daemon and with one that flies.
-#   serve_requests.sh SOURCE_DIR BUILD_DIR
-set -euo pipefail
-source_dir=$1 build=$2
-source "$source_dir/services/bench/session.sh"
+source "$(dirname "${BASH_SOURCE[0]}")/processes.sh"
 bin=$build/services
 
 # begin: starts serve; $url is what it printed.

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/track/frame_alignment.hpp"
-#include "tests/track/flown/frames.hpp"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <random>
+
+#include "core/track/frame_alignment.hpp"
+#include "tests/track/flown/frames.hpp"
 
 namespace backwash::track {
 namespace {
@@ -137,6 +138,141 @@ TEST(FrameAlignment, IsNotAlignedWhileTheAttitudesAreTilted) {
     ++ticks;
   }
   EXPECT_LE(ticks, 8);
+}
+
+/// Learnt from a vehicle at rest, then watched with the local pose off by this much until the residuals have settled.
+FrameAlignment watched(const Vec3& off, double turned) {
+  const Frames truth(0.5, {1, 2, 3});
+  const FramePose map{{1, 1, 1}, 0.2};
+  FrameAlignment alignment;
+  for (int i = 0; i < 50; ++i) alignment.update(map, truth.local(map), kControlPeriod, true);
+  FramePose local = truth.local(map);
+  local.p += off;
+  local.yaw += turned;
+  for (int i = 0; i < 200; ++i) alignment.update(map, local, kControlPeriod, false);
+  return alignment;
+}
+
+// docs/interfaces.md: residual below 5 cm and 3°.
+TEST(FrameAlignmentLimits, EndsAtFiveCentimetresAndThreeDegreesAndNowhereElse) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  for (const Vec3& axis : {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1), Vec3(0.6, 0, -0.8)}) {
+    EXPECT_TRUE(watched(0.049 * axis, 0).aligned()) << axis.transpose();
+    EXPECT_FALSE(watched(0.051 * axis, 0).aligned()) << axis.transpose();
+  }
+  for (const double sign : {-1.0, 1.0}) {
+    EXPECT_TRUE(watched(Vec3::Zero(), sign * 2.9 * kDegree).aligned());
+    EXPECT_FALSE(watched(Vec3::Zero(), sign * 3.1 * kDegree).aligned());
+  }
+}
+
+TEST(FrameAlignmentLimits, NeedsHalfASecondOfSamples) {
+  const Frames truth(0.5, {1, 2, 3});
+  const FramePose map{{1, 1, 1}, 0.2};
+  FrameAlignment alignment;
+  for (int i = 1; i <= 25; ++i) {
+    alignment.update(map, truth.local(map), kControlPeriod, true);
+    EXPECT_EQ(alignment.aligned(), i == 25) << i;
+  }
+}
+
+TEST(FrameAlignmentLimits, TellsAResetFromNoiseByPositionAndByHeading) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  const Frames truth(0.5, {1, 2, 3});
+  const FramePose map{{1, 1, 1}, 0.2};
+  const FrameAlignment alignment = watched(Vec3::Zero(), 0);
+  const auto off = [&](const Vec3& by, double turned) {
+    FramePose local = truth.local(map);
+    local.p += by;
+    local.yaw += turned;
+    return alignment.reset_between(map, local);
+  };
+  EXPECT_FALSE(off({0, 0.14, 0}, 0));
+  EXPECT_TRUE(off({0, 0.16, 0}, 0));
+  EXPECT_FALSE(off(Vec3::Zero(), -8.9 * kDegree));
+  EXPECT_TRUE(off(Vec3::Zero(), -9.1 * kDegree));
+  EXPECT_FALSE(FrameAlignment().reset_between(map, {{9, 9, 9}, 3})) << "nothing was learnt yet";
+}
+
+// Every part of a command goes out in the controller's frame.
+TEST(FrameAlignmentLimits, TurnsEveryPartOfACommand) {
+  const Frames truth(0.5, {1, 2, 3});
+  const Setpoint sent = watched(Vec3::Zero(), 0).to_local({{2, -1, 0.5}, {1, 2, 0.5}, {0.1, 0.2, 0.3}, 3.0});
+  EXPECT_LT((sent.p_W - truth.local_from_map * Vec3(2, -1, 0.5)).norm(), 1e-9);
+  EXPECT_LT((sent.v_W - truth.local_from_map.linear() * Vec3(1, 2, 0.5)).norm(), 1e-9);
+  EXPECT_LT((sent.a_W - truth.local_from_map.linear() * Vec3(0.1, 0.2, 0.3)).norm(), 1e-9);
+  EXPECT_NEAR(sent.yaw, wrap_angle(3.5), 1e-9);
+}
+
+TEST(FrameAlignmentLimits, AFrozenAlignmentDoesNotFollow) {
+  const FrameAlignment alignment = watched({0.03, 0, 0}, 0);
+  const Frames truth(0.5, {1, 2, 3});
+  EXPECT_LT((alignment.to_local({{2, -1, 0.5}}).p_W - truth.local_from_map * Vec3(2, -1, 0.5)).norm(), 1e-9);
+  EXPECT_NEAR(alignment.position_residual(), 0.03, 1e-6);
+}
+
+// Row 7: what carrying the vehicle about before it is enabled shows of frames that do not match.
+
+/// Six seconds of motion along all axes; `wrong` changes what the controller says of it.
+Mismatch after(const std::function<void(FramePose&)>& wrong) {
+  FrameAlignment alignment;
+  for (int n = 0; n < 300; ++n) {
+    const double t = 0.02 * n;
+    // Circles: no two axes move alike, which a turn could explain.
+    const FramePose map{{std::sin(2 * t) / 2, -std::cos(2 * t) / 2, 0.5 * std::sin(0.9 * t)},
+                        0.3,
+                        {std::cos(2 * t), std::sin(2 * t), 0.45 * std::cos(0.9 * t)}};
+    FramePose local = map;
+    wrong(local);
+    alignment.update(map, local, 0.02, true);
+  }
+  return alignment.mismatch();
+}
+
+Vec3 up_tilted(const Vec3& axis, double angle) { return Eigen::AngleAxisd(angle, axis) * Vec3::UnitZ(); }
+
+TEST(FrameMismatch, FramesThatMatchShowNone) {
+  EXPECT_EQ(after([](auto&) {}), Mismatch::none);
+}
+
+TEST(FrameMismatch, NamesTheAxisThatIsMirroredOrDead) {
+  const Mismatch names[] = {Mismatch::x, Mismatch::y, Mismatch::z};
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(after([=](auto& l) {
+                l.p[axis] *= -1;
+                l.v[axis] *= -1;
+              }),
+              names[axis]);
+    EXPECT_EQ(after([=](auto& l) { l.v[axis] = 0; }), names[axis]);
+  }
+}
+
+TEST(FrameMismatch, NamesAYawOfMoreThanTenDegrees) {
+  const auto turned = [](double degrees) {
+    return after([=](auto& l) {
+      const Eigen::AngleAxisd R(degrees * std::numbers::pi / 180, Vec3::UnitZ());
+      l.p = R * l.p;
+      l.v = R * l.v;  // the heading is right, the motion is in another frame
+    });
+  };
+  for (const double sign : {-1.0, 1.0}) {
+    EXPECT_EQ(turned(sign * 9), Mismatch::none);
+    EXPECT_EQ(turned(sign * 11), Mismatch::yaw);
+    EXPECT_EQ(turned(sign * 90), Mismatch::yaw);
+  }
+}
+
+TEST(FrameMismatch, NamesATiltOfMoreThanFiveDegrees) {
+  const auto tilted = [](const Vec3& axis, double degrees) {
+    return after([=](auto& l) { l.up_B = up_tilted(axis, degrees * std::numbers::pi / 180); });
+  };
+  for (const double sign : {-1.0, 1.0}) {
+    EXPECT_EQ(tilted(Vec3::UnitX(), sign * 4.8), Mismatch::none);
+    EXPECT_EQ(tilted(Vec3::UnitX(), sign * 5.2), Mismatch::roll);
+    EXPECT_EQ(tilted(Vec3::UnitY(), sign * 4.8), Mismatch::none);
+    EXPECT_EQ(tilted(Vec3::UnitY(), sign * 5.2), Mismatch::pitch);
+  }
+  EXPECT_EQ(tilted(Vec3::UnitX(), 180), Mismatch::roll) << "upside down";
 }
 
 }  // namespace

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Odometry that comes seldom or late, as it was stated (docs/model.md 4-13 to 4-15).
-#include "core/types/odometry_timing.hpp"
-
 #include <gtest/gtest.h>
 
 #include "core/track/frame_alignment.hpp"
 #include "core/track/odometry_gate.hpp"
 #include "core/track/supervisor.hpp"
 #include "core/track/tracker.hpp"
+#include "core/types/odometry_timing.hpp"
+#include "tests/track/flown/flown.hpp"
 
 namespace backwash::track {
 namespace {
@@ -196,3 +196,20 @@ TEST(SlowSupervisor, WaitsForTheLongerGapAndNoMore) {
 
 }  // namespace
 }  // namespace backwash::track
+
+namespace backwash::track::test {
+namespace {
+
+TEST(UsualTiming, APoseIsJudgedAgainstTheSetOfTheTickHoweverOldItIsWithinIt) {
+  Flown flown;
+  flown.age_ns = 15'000'000;
+  for (int n = 0; n < 5; ++n) {
+    const TickOutput& out = flown.step();
+    ASSERT_TRUE(out.inside.judged);
+    EXPECT_EQ(out.inside.center, flown.segment.tube[out.judged_index].center.p_W);
+    EXPECT_EQ(out.inside.half_widths, flown.segment.tube[out.judged_index].half_widths);
+  }
+}
+
+}  // namespace
+}  // namespace backwash::track::test

@@ -226,34 +226,5 @@ TEST_F(HugeMapFault, AFewBytesThatMeanAHugeMapAreRefusedBeforeTheyCostMemoryOrTi
   EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::milliseconds(20 * sent));
 }
 
-TEST_F(HugeMapFault, TheCapIsWhatItSays) {
-  // 115 bytes a voxel (map_worker.cpp): 1 MiB are 9,118 voxels, 20 × 20 × 22 = 8,800 fit and 21 × 21 × 22 = 9,702 do
-  // not.
-  settings_.max_mib = 1;
-  use(*channels_);
-  send(*channels_, map::encode_octomap(map::OccupancyGrid({0, 0, 0}, 0.2, {21, 21, 22}, map::Cell::free)));
-  EXPECT_EQ(channels_->maps_rejected, 1u);
-  send(*channels_, map::encode_octomap(map::OccupancyGrid({0, 0, 0}, 0.2, {20, 20, 22}, map::Cell::free)));
-  EXPECT_EQ(channels_->maps_accepted, 1u);
-}
-
-// Whatever a few bytes mean: never more than the cap.
-TEST_F(HugeMapFault, RandomTreesOfAFewBytesStayBelowTheCap) {
-  settings_.max_mib = 1;
-  use(*channels_);
-  std::mt19937 random(5);
-  malloc_trim(0);
-  forget_peak();
-  const long before = peak_kib();
-  for (int n = 0; n < 3000; ++n) {
-    std::vector<std::int8_t> data(2 + random() % 64);
-    // Full of nodes with children, so that most of them go deep.
-    for (auto& byte : data) byte = static_cast<std::int8_t>(random() % 3 == 0 ? random() : 3 << 2 * (random() % 4));
-    send(*channels_, std::move(data), 0.2, random() % 8 != 0);
-  }
-  EXPECT_GT(channels_->maps_rejected, 2000u);
-  EXPECT_LT(peak_kib() - before, 16 * 1024) << "KiB at its peak";
-}
-
 }  // namespace
 }  // namespace backwash::daemon::test

@@ -121,18 +121,5 @@ TEST(EstimatorResetFault, WhenTheControllersEstimatorResetsTheVehicleHoldsInTheN
   }
 }
 
-TEST(EstimatorResetFault, TheControllersOwnResetCounterIsEnough) {
-  Lockstep rig;
-  rig.take_off();
-  rig.say(mavlink::Odometry{.q = {1, 0, 0, 0}, .reset_counter = 7});
-  rig.ticks(10);
-  EXPECT_EQ(rig.mode(), Mode::tracking);
-  rig.say(mavlink::Odometry{.q = {1, 0, 0, 0}, .reset_counter = 8});
-  const int ticks = rig.ticks_until(Mode::hold, 5);
-  EXPECT_GT(ticks, 0);
-  EXPECT_LE(ticks, 2);
-  EXPECT_EQ(rig.reason(), Reason::autopilot_reset);
-}
-
 }  // namespace
 }  // namespace backwash::daemon::test

@@ -13,7 +13,7 @@
 namespace backwash::daemon {
 
 constexpr std::int64_t kMs = 1'000'000, kSecond = 1000 * kMs;
-constexpr WriterId kOne{1}, kOther{2};
+constexpr WriterId kOne{1}, kAnother{2};
 
 inline std::vector<std::uint8_t> bytes(std::size_t count) {
   std::mt19937 random(1);
