@@ -7,11 +7,9 @@
 
 #include <unistd.h>
 
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <stdexcept>
 
 #include "core/config/config.hpp"
 #include "core/config/daemon_config.hpp"
