@@ -23,17 +23,17 @@ std::uint32_t milliseconds_of(Time t) noexcept {
 
 std::string_view name(LinkFault fault) noexcept {
   switch (fault) {
-    case LinkFault::kPortLost:
+    case LinkFault::port_lost:
       return "port lost";
-    case LinkFault::kNothingReceived:
+    case LinkFault::nothing_received:
       return "nothing received";
-    case LinkFault::kNoValidFrame:
+    case LinkFault::no_valid_frame:
       return "no valid frame (wrong baud rate?)";
-    case LinkFault::kNoneSignedRightly:
+    case LinkFault::none_signed_rightly:
       return "no frame with a good signature (another key, or not signed?)";
-    case LinkFault::kHeartbeatLost:
+    case LinkFault::heartbeat_lost:
       return "heartbeat lost";
-    case LinkFault::kTransmitStalled:
+    case LinkFault::transmit_stalled:
       return "transmit stalled";
   }
   return "unknown";
@@ -111,15 +111,15 @@ void AutopilotLink::discard_unsent() noexcept {
 /// before it counts as heard, it is asked for the time, once a second: that frame carries ours.
 bool AutopilotLink::signature_good(const mavlink::Frame& frame, Time now) noexcept {
   const auto verdict = signing_->judge(frame);
-  if (verdict == mavlink::SignatureVerdict::kGood) return signed_rightly_ = true;
-  const bool late = verdict == mavlink::SignatureVerdict::kOld || verdict == mavlink::SignatureVerdict::kReplayed;
+  if (verdict == mavlink::SignatureVerdict::good) return signed_rightly_ = true;
+  const bool late = verdict == mavlink::SignatureVerdict::old || verdict == mavlink::SignatureVerdict::replayed;
   const bool from_vehicle = frame.sender.component == kFlightController &&
                             frame.sender.system == configured_vehicle_.value_or(frame.sender.system);
   const auto age = heartbeat_age(now);
   if (late && from_vehicle && !(age && *age < kHeartbeatTimeout) && now - time_told_ >= 1s) {
     time_told_ = now;
     const mavlink::Timesync question{0, nanoseconds_of(now), frame.sender.system, kFlightController};
-    send_as(frame.sender.system, question, TransmitQueue::Kind::kOther);
+    send_as(frame.sender.system, question, TransmitQueue::Kind::other);
   }
   return false;
 }
@@ -193,15 +193,15 @@ std::optional<std::int64_t> AutopilotLink::round_trip(Time now) const noexcept {
 }
 
 std::optional<LinkFault> AutopilotLink::fault(Time now) const noexcept {
-  if (lost_) return LinkFault::kPortLost;
+  if (lost_) return LinkFault::port_lost;
   const auto age = heartbeat_age(now);
   if (!age && now - opened_at_ >= kFirstFrameTimeout) {
-    if (received().bytes == 0) return LinkFault::kNothingReceived;
-    if (received().frames == 0) return LinkFault::kNoValidFrame;
-    return signing_ && !signed_rightly_ ? LinkFault::kNoneSignedRightly : LinkFault::kHeartbeatLost;
+    if (received().bytes == 0) return LinkFault::nothing_received;
+    if (received().frames == 0) return LinkFault::no_valid_frame;
+    return signing_ && !signed_rightly_ ? LinkFault::none_signed_rightly : LinkFault::heartbeat_lost;
   }
-  if (age && *age >= kHeartbeatTimeout) return LinkFault::kHeartbeatLost;
-  if (transmit_stalled(now)) return LinkFault::kTransmitStalled;
+  if (age && *age >= kHeartbeatTimeout) return LinkFault::heartbeat_lost;
+  if (transmit_stalled(now)) return LinkFault::transmit_stalled;
   return std::nullopt;
 }
 
@@ -222,7 +222,7 @@ bool AutopilotLink::send_as(std::uint8_t system, const Message& message, Transmi
   mavlink::EncodedFrame frame = mavlink::encode_frame({system, kOnboardComputer, sequence_++}, message, flags);
   if (signing_ && !signing_->sign(frame)) return false;
   if (tap_) tap_(tap_context_, true, frame.view());
-  budget_.give(frame.length, kind == TransmitQueue::Kind::kOdometry, now_);
+  budget_.give(frame.length, kind == TransmitQueue::Kind::odometry, now_);
   queue_.push(frame, kind);
   flush();
   return !lost_;
@@ -230,7 +230,7 @@ bool AutopilotLink::send_as(std::uint8_t system, const Message& message, Transmi
 
 bool AutopilotLink::send_setpoint(const Setpoint& setpoint_L, Time now) noexcept {
   return send(setpoint_message(setpoint_L, milliseconds_of(now), {heard_.value_or(0), kFlightController}),
-              TransmitQueue::Kind::kSetpoint);
+              TransmitQueue::Kind::setpoint);
 }
 
 bool AutopilotLink::send_heartbeat() noexcept {
@@ -246,7 +246,7 @@ bool AutopilotLink::send_odometry(const VioSample& sample) noexcept {
     ++thinned_;
     return false;
   }
-  return send(odometry_message(sample), TransmitQueue::Kind::kOdometry);
+  return send(odometry_message(sample), TransmitQueue::Kind::odometry);
 }
 
 bool AutopilotLink::send_statustext(std::uint8_t severity, std::string_view text) noexcept {

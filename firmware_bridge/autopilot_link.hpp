@@ -35,12 +35,12 @@ inline constexpr std::uint16_t kCommandMessage = 512, kCommandLand = 21, kComman
 
 /// What is wrong with the link, the gravest first.
 enum class LinkFault : std::uint8_t {
-  kPortLost,           ///< row 17: unplugged; reconnect() with a new port
-  kNothingReceived,    ///< row 19: not one byte within 2 s: cable, or the controller is off
-  kNoValidFrame,       ///< row 19: bytes, but no frame within 2 s: wrong baud rate or no MAVLink
-  kNoneSignedRightly,  ///< row 29: frames, but none within 2 s whose signature is good: another key, or signing is off
-  kHeartbeatLost,      ///< row 21: none from the flight controller for 1.5 s
-  kTransmitStalled,    ///< row 20: transmit_stalled()
+  port_lost,            ///< row 17: unplugged; reconnect() with a new port
+  nothing_received,     ///< row 19: not one byte within 2 s: cable, or the controller is off
+  no_valid_frame,       ///< row 19: bytes, but no frame within 2 s: wrong baud rate or no MAVLink
+  none_signed_rightly,  ///< row 29: frames, but none within 2 s whose signature is good: another key, or signing is off
+  heartbeat_lost,       ///< row 21: none from the flight controller for 1.5 s
+  transmit_stalled,     ///< row 20: transmit_stalled()
 };
 std::string_view name(LinkFault fault) noexcept;
 
@@ -145,7 +145,7 @@ class AutopilotLink {
 
  private:
   template <class Message>
-  bool send(const Message& message, TransmitQueue::Kind kind = TransmitQueue::Kind::kOther) noexcept;
+  bool send(const Message& message, TransmitQueue::Kind kind = TransmitQueue::Kind::other) noexcept;
   template <class Message>
   bool send_as(std::uint8_t system, const Message& message, TransmitQueue::Kind kind) noexcept;
   void flush() noexcept;

@@ -116,7 +116,7 @@ void Telemetry::take(const mavlink::SysStatus& m, Time now) noexcept {
 }
 
 void Telemetry::take(const mavlink::ExtendedSysState& m, Time now) noexcept {
-  if (m.landed_state > static_cast<std::uint8_t>(LandedState::kLanding)) {
+  if (m.landed_state > static_cast<std::uint8_t>(LandedState::landing)) {
     ++broken;
     return;
   }

@@ -69,7 +69,7 @@ struct Battery {
 };
 
 /// From EXTENDED_SYS_STATE.
-enum class LandedState : std::uint8_t { kUndefined, kOnGround, kInAir, kTakingOff, kLanding };
+enum class LandedState : std::uint8_t { undefined, on_ground, in_air, taking_off, landing };
 
 /// From AUTOPILOT_VERSION.
 struct FirmwareVersion {

@@ -52,21 +52,21 @@ SignatureVerdict Signing::judge_stream(const Stream& now) noexcept {
   };
   auto at = std::ranges::find_if(streams_, same);
   if (at != streams_.end()) {
-    if (now.time <= (*at)->time) return SignatureVerdict::kReplayed;
+    if (now.time <= (*at)->time) return SignatureVerdict::replayed;
   } else {
-    if (now.time + kOldestNewStream < time_) return SignatureVerdict::kOld;
+    if (now.time + kOldestNewStream < time_) return SignatureVerdict::old;
     at = std::ranges::find_if(streams_, [](const auto& s) { return !s; });
-    if (at == streams_.end()) return SignatureVerdict::kNoRoom;
+    if (at == streams_.end()) return SignatureVerdict::no_room;
   }
   *at = now;
   advance_to(now.time);
-  return SignatureVerdict::kGood;
+  return SignatureVerdict::good;
 }
 
 SignatureVerdict Signing::judge(const Frame& frame) noexcept {
   if (frame.signature.size() != kSignature) {
     ++counters_.unsigned_frames;
-    return SignatureVerdict::kUnsigned;
+    return SignatureVerdict::not_signed;
   }
   // Every byte is compared, so that the time taken tells nothing of how many were right.
   const Hash right = hash(frame.bytes, frame.signature.first(kLinkAndTime));
@@ -75,18 +75,18 @@ SignatureVerdict Signing::judge(const Frame& frame) noexcept {
     difference = static_cast<std::uint8_t>(difference | (right[i] ^ frame.signature[kLinkAndTime + i]));
   if (difference != 0) {
     ++counters_.wrong_signature;
-    return SignatureVerdict::kWrongSignature;
+    return SignatureVerdict::wrong_signature;
   }
   const SignatureVerdict verdict =
       judge_stream({frame.sender.system, frame.sender.component, frame.signature[0], time_of(frame.signature)});
   switch (verdict) {
-    case SignatureVerdict::kReplayed:
+    case SignatureVerdict::replayed:
       ++counters_.replayed;
       break;
-    case SignatureVerdict::kOld:
+    case SignatureVerdict::old:
       ++counters_.old;
       break;
-    case SignatureVerdict::kNoRoom:
+    case SignatureVerdict::no_room:
       ++counters_.no_room;
       break;
     default:

@@ -19,12 +19,12 @@ inline constexpr SigningTime kOldestNewStream = 60 * kSigningSecond;  ///< behin
 
 /// What a frame's signature is worth.
 enum class SignatureVerdict : std::uint8_t {
-  kGood,
-  kUnsigned,        ///< no signature; MAVLink 1 has none
-  kWrongSignature,  ///< made with another key, or the frame was changed
-  kReplayed,        ///< right, but not newer than the last of its stream
-  kOld,             ///< right, the first of its stream and more than a minute behind our own time
-  kNoRoom,          ///< right, but of one more stream than are kept
+  good,
+  not_signed,       ///< no signature; MAVLink 1 has none
+  wrong_signature,  ///< made with another key, or the frame was changed
+  replayed,         ///< right, but not newer than the last of its stream
+  old,              ///< right, the first of its stream and more than a minute behind our own time
+  no_room,          ///< right, but of one more stream than are kept
 };
 
 struct SigningCounters {

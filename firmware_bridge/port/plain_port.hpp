@@ -26,13 +26,13 @@ class PlainPort {
   /// `system`: what the controller is called as a MAVLink system.
   PlainPort(SerialPort line, std::uint8_t system) noexcept : line_(std::move(line)), system_(system) {}
 
-  /// MAVLink frames of what has arrived, 0 bytes when there is nothing. `into` has room for kLargestRead. Error: kLost.
+  /// MAVLink frames of what has arrived, 0 bytes when there is nothing. `into` has room for kLargestRead. Error: lost.
   /// Real-time: a bounded number of non-blocking system calls, no allocation.
   static constexpr std::size_t kLargestRead = 2048;
   tl::expected<std::size_t, PortError> read(std::span<std::uint8_t> into) noexcept;
 
   /// One MAVLink frame or a part of it: all its bytes, or 0 while the kernel has not taken the plain frame before.
-  /// Error: kLost. Real-time: two non-blocking system calls, no allocation.
+  /// Error: lost. Real-time: two non-blocking system calls, no allocation.
   tl::expected<std::size_t, PortError> write(std::span<const std::uint8_t> bytes) noexcept;
 
   /// Forgets what the kernel has not sent yet. A frame cut on the line is refused there by its checksum.

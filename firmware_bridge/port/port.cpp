@@ -14,25 +14,25 @@ FileDescriptor::~FileDescriptor() {
 std::string describe(const PortError& error) {
   std::string text;
   switch (error.kind) {
-    case PortError::Kind::kOpen:
+    case PortError::Kind::open:
       text = "cannot be opened";
       break;
-    case PortError::Kind::kBusy:
+    case PortError::Kind::busy:
       text = "is held by another program";
       break;
-    case PortError::Kind::kNotSerial:
+    case PortError::Kind::not_serial:
       text = "is not a serial port";
       break;
-    case PortError::Kind::kBaudRate:
+    case PortError::Kind::baud_rate:
       text = "cannot do this baud rate";
       break;
-    case PortError::Kind::kConfigure:
+    case PortError::Kind::configure:
       text = "refused its settings";
       break;
-    case PortError::Kind::kAddress:
+    case PortError::Kind::address:
       text = "is not a numeric IPv4 address";
       break;
-    case PortError::Kind::kLost:
+    case PortError::Kind::lost:
       text = "was unplugged or hung up";
       break;
   }

@@ -13,13 +13,13 @@ namespace backwash::firmware_bridge {
 /// Why a port could not be opened or used.
 struct PortError {
   enum class Kind {
-    kOpen,       ///< the path or socket could not be opened
-    kBusy,       ///< another program holds the serial port
-    kNotSerial,  ///< the path is not a terminal device
-    kBaudRate,   ///< a rate that the device cannot do
-    kConfigure,  ///< the device refused its settings
-    kAddress,    ///< not a numeric IPv4 address
-    kLost,       ///< unplugged, hung up, or a failing device; open it again
+    open,        ///< the path or socket could not be opened
+    busy,        ///< another program holds the serial port
+    not_serial,  ///< the path is not a terminal device
+    baud_rate,   ///< a rate that the device cannot do
+    configure,   ///< the device refused its settings
+    address,     ///< not a numeric IPv4 address
+    lost,        ///< unplugged, hung up, or a failing device; open it again
   };
   Kind kind;
   int system_error = 0;  ///< errno; 0 where there is none (hang-up)
@@ -36,7 +36,7 @@ struct ClosedPort {
   void discard_output() noexcept {}
 
  private:
-  static tl::unexpected<PortError> lost() noexcept { return tl::unexpected(PortError{PortError::Kind::kLost}); }
+  static tl::unexpected<PortError> lost() noexcept { return tl::unexpected(PortError{PortError::Kind::lost}); }
 };
 
 /// Owns a file descriptor.

@@ -54,21 +54,21 @@ void ask_for_low_latency(int fd) noexcept {
 }  // namespace
 
 tl::expected<SerialPort, PortError> SerialPort::open(const std::string& path, unsigned baud) {
-  if (baud == 0) return error(Kind::kBaudRate, 0);
+  if (baud == 0) return error(Kind::baud_rate, 0);
   FileDescriptor fd(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  if (fd.get() < 0) return error(errno == EBUSY ? Kind::kBusy : Kind::kOpen, errno);
-  if (!lock(fd.get())) return error(Kind::kBusy, errno);
+  if (fd.get() < 0) return error(errno == EBUSY ? Kind::busy : Kind::open, errno);
+  if (!lock(fd.get())) return error(Kind::busy, errno);
   termios2 settings{};
   if (::ioctl(fd.get(), TCGETS2, &settings) != 0)
-    return error(errno == ENOTTY ? Kind::kNotSerial : Kind::kConfigure, errno);
+    return error(errno == ENOTTY ? Kind::not_serial : Kind::configure, errno);
   make_raw(settings, baud);
-  if (::ioctl(fd.get(), TCSETS2, &settings) != 0) return error(Kind::kConfigure, errno);
+  if (::ioctl(fd.get(), TCSETS2, &settings) != 0) return error(Kind::configure, errno);
   // The call succeeds when any of the settings was taken; a rate becomes what the device's clock can be divided to.
   termios2 taken{};
-  if (::ioctl(fd.get(), TCGETS2, &taken) != 0) return error(Kind::kConfigure, errno);
-  if (std::abs(static_cast<double>(taken.c_ospeed) - baud) > kBaudTolerance * baud) return error(Kind::kBaudRate, 0);
+  if (::ioctl(fd.get(), TCGETS2, &taken) != 0) return error(Kind::configure, errno);
+  if (std::abs(static_cast<double>(taken.c_ospeed) - baud) > kBaudTolerance * baud) return error(Kind::baud_rate, 0);
   ask_for_low_latency(fd.get());
-  if (::ioctl(fd.get(), TIOCEXCL) != 0) return error(Kind::kConfigure, errno);
+  if (::ioctl(fd.get(), TIOCEXCL) != 0) return error(Kind::configure, errno);
   ::ioctl(fd.get(), TCFLSH, TCIOFLUSH);
   return SerialPort(std::move(fd));
 }
@@ -77,19 +77,19 @@ tl::expected<std::size_t, PortError> SerialPort::read(std::span<std::uint8_t> in
   // Only what is at hand is read: a read from an empty terminal waits, even when non-blocking, until a kernel worker
   // has flushed the line, and that worker has ordinary priority (up to 300 ms seen with both processors busy).
   int at_hand = 0;
-  if (::ioctl(fd_.get(), FIONREAD, &at_hand) != 0) return error(Kind::kLost, errno);
+  if (::ioctl(fd_.get(), FIONREAD, &at_hand) != 0) return error(Kind::lost, errno);
   if (at_hand <= 0) return 0U;
   const auto n = ::read(fd_.get(), into.data(), std::min(into.size(), static_cast<std::size_t>(at_hand)));
   if (n > 0) return static_cast<std::size_t>(n);
   if (n < 0 && nothing_now(errno)) return 0U;
-  return error(Kind::kLost, n < 0 ? errno : 0);
+  return error(Kind::lost, n < 0 ? errno : 0);
 }
 
 tl::expected<std::size_t, PortError> SerialPort::write(std::span<const std::uint8_t> bytes) noexcept {
   const auto n = ::write(fd_.get(), bytes.data(), bytes.size());
   if (n >= 0) return static_cast<std::size_t>(n);
   if (nothing_now(errno)) return 0U;
-  return error(Kind::kLost, errno);
+  return error(Kind::lost, errno);
 }
 
 void SerialPort::discard_output() noexcept { ::ioctl(fd_.get(), TCFLSH, TCOFLUSH); }

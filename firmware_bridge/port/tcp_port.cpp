@@ -45,12 +45,12 @@ tl::expected<TcpPort, PortError> TcpPort::open(const std::string& address, std::
   sockaddr_in there{};
   there.sin_family = AF_INET;
   there.sin_port = htons(port);
-  if (::inet_pton(AF_INET, address.c_str(), &there.sin_addr) != 1) return error(Kind::kAddress, 0);
+  if (::inet_pton(AF_INET, address.c_str(), &there.sin_addr) != 1) return error(Kind::address, 0);
   FileDescriptor fd(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  if (fd.get() < 0 || !configure(fd.get())) return error(Kind::kOpen, errno);
+  if (fd.get() < 0 || !configure(fd.get())) return error(Kind::open, errno);
   if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&there), sizeof there) != 0) {
     const int number = errno == EINPROGRESS ? await_connection(fd.get(), patience) : errno;
-    if (number != 0) return error(Kind::kOpen, number);
+    if (number != 0) return error(Kind::open, number);
   }
   return TcpPort(std::move(fd));
 }
@@ -59,14 +59,14 @@ tl::expected<std::size_t, PortError> TcpPort::read(std::span<std::uint8_t> into)
   const auto n = ::recv(fd_.get(), into.data(), into.size(), 0);
   if (n > 0) return static_cast<std::size_t>(n);
   if (n < 0 && nothing_now(errno)) return 0U;
-  return error(Kind::kLost, n < 0 ? errno : 0);
+  return error(Kind::lost, n < 0 ? errno : 0);
 }
 
 tl::expected<std::size_t, PortError> TcpPort::write(std::span<const std::uint8_t> bytes) noexcept {
   const auto n = ::send(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
   if (n >= 0) return static_cast<std::size_t>(n);
   if (nothing_now(errno)) return 0U;
-  return error(Kind::kLost, errno);
+  return error(Kind::lost, errno);
 }
 
 }  // namespace backwash::firmware_bridge

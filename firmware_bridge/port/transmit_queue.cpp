@@ -8,16 +8,16 @@ namespace backwash::firmware_bridge {
 void TransmitQueue::push(const mavlink::EncodedFrame& frame, Kind kind) noexcept {
   const std::size_t first_whole = head_written_ > 0 ? 1 : 0;
   bool missed = false;
-  for (std::size_t i = count_; i-- > 0 && kind != Kind::kOther;) {
+  for (std::size_t i = count_; i-- > 0 && kind != Kind::other;) {
     const bool older = frames_[i].kind == kind;
-    missed = missed || (older && kind == Kind::kSetpoint);
-    if (i < first_whole || (!older && frames_[i].kind != Kind::kOdometry)) continue;
+    missed = missed || (older && kind == Kind::setpoint);
+    if (i < first_whole || (!older && frames_[i].kind != Kind::odometry)) continue;
     remove(i);
     ++dropped_;
   }
   if (missed) ++missed_setpoints_;
   if (count_ == kCapacity) {
-    if (frames_[first_whole].kind == Kind::kSetpoint) ++missed_setpoints_;
+    if (frames_[first_whole].kind == Kind::setpoint) ++missed_setpoints_;
     remove(first_whole);
     ++dropped_;
   }
@@ -25,7 +25,7 @@ void TransmitQueue::push(const mavlink::EncodedFrame& frame, Kind kind) noexcept
 }
 
 void TransmitQueue::finish_head() noexcept {
-  if (frames_[0].kind == Kind::kSetpoint) missed_setpoints_ = 0;
+  if (frames_[0].kind == Kind::setpoint) missed_setpoints_ = 0;
   remove(0);
   head_written_ = 0;
   ++sent_;

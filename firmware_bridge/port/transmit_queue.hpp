@@ -19,7 +19,7 @@ class TransmitQueue {
  public:
   static constexpr std::size_t kCapacity = 16;
 
-  enum class Kind { kSetpoint, kOdometry, kOther };
+  enum class Kind { setpoint, odometry, other };
 
   void push(const mavlink::EncodedFrame& frame, Kind kind) noexcept;
 
@@ -49,7 +49,7 @@ class TransmitQueue {
  private:
   struct Entry {
     mavlink::EncodedFrame frame;
-    Kind kind = Kind::kOther;
+    Kind kind = Kind::other;
   };
   void finish_head() noexcept;
   void remove(std::size_t index) noexcept;

@@ -38,18 +38,18 @@ const sockaddr* generic(const sockaddr_in* a) noexcept { return reinterpret_cast
 tl::expected<UdpPort, PortError> UdpPort::open(const Endpoint& local, const std::optional<Endpoint>& peer,
                                                Clock::duration patience) {
   const auto here = socket_address(local);
-  if (!here) return error(Kind::kAddress, 0);
+  if (!here) return error(Kind::address, 0);
   FileDescriptor fd(::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  if (fd.get() < 0) return error(Kind::kOpen, errno);
-  if (::bind(fd.get(), generic(&*here), sizeof(*here)) != 0) return error(Kind::kOpen, errno);
+  if (fd.get() < 0) return error(Kind::open, errno);
+  if (::bind(fd.get(), generic(&*here), sizeof(*here)) != 0) return error(Kind::open, errno);
   if (peer) {
     const auto there = socket_address(*peer);
-    if (!there) return error(Kind::kAddress, 0);
-    if (::connect(fd.get(), generic(&*there), sizeof(*there)) != 0) return error(Kind::kOpen, errno);
+    if (!there) return error(Kind::address, 0);
+    if (::connect(fd.get(), generic(&*there), sizeof(*there)) != 0) return error(Kind::open, errno);
   }
   sockaddr_in bound{};
   socklen_t size = sizeof(bound);
-  if (::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&bound), &size) != 0) return error(Kind::kOpen, errno);
+  if (::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&bound), &size) != 0) return error(Kind::open, errno);
   return UdpPort(std::move(fd), ntohs(bound.sin_port), peer.has_value(), patience);
 }
 
@@ -58,7 +58,7 @@ tl::expected<std::size_t, PortError> UdpPort::read(std::span<std::uint8_t> into)
   socklen_t size = sizeof(from);
   const auto n = ::recvfrom(fd_.get(), into.data(), into.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
   if (n < 0) {
-    if (!nothing_now(errno)) return error(Kind::kLost, errno);
+    if (!nothing_now(errno)) return error(Kind::lost, errno);
     if (finds_peer_ && has_peer_ && Clock::now() - heard_ >= patience_) listen_to_anyone();
     return 0U;
   }
@@ -82,7 +82,7 @@ tl::expected<std::size_t, PortError> UdpPort::write(std::span<const std::uint8_t
   const auto n = ::send(fd_.get(), bytes.data(), bytes.size(), 0);
   if (n >= 0) return static_cast<std::size_t>(n);
   if (nothing_now(errno)) return 0U;
-  return error(Kind::kLost, errno);
+  return error(Kind::lost, errno);
 }
 
 }  // namespace backwash::firmware_bridge

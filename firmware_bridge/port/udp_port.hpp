@@ -25,15 +25,15 @@ class UdpPort {
     std::uint16_t port = 0;
   };
 
-  /// Binds to `local` (port 0: any free one). Errors: kAddress, kOpen. Not real-time.
+  /// Binds to `local` (port 0: any free one). Errors: address, open. Not real-time.
   static tl::expected<UdpPort, PortError> open(const Endpoint& local, const std::optional<Endpoint>& peer,
                                                Clock::duration patience = kPatience);
 
-  /// One datagram (its excess over `into` is lost), 0 bytes when there is none. Error: kLost. Real-time: at most two
+  /// One datagram (its excess over `into` is lost), 0 bytes when there is none. Error: lost. Real-time: at most two
   /// non-blocking system calls, no allocation. Its clock is CLOCK_MONOTONIC.
   tl::expected<std::size_t, PortError> read(std::span<std::uint8_t> into) noexcept;
 
-  /// All bytes as one datagram, or 0 when the kernel's buffer is full or no peer is known. Error: kLost. Real-time: one
+  /// All bytes as one datagram, or 0 when the kernel's buffer is full or no peer is known. Error: lost. Real-time: one
   /// non-blocking system call, no allocation.
   tl::expected<std::size_t, PortError> write(std::span<const std::uint8_t> bytes) noexcept;
 

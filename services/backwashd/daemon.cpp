@@ -57,7 +57,7 @@ firmware_bridge::Port port_at_start(const decltype(config::Daemon::link)& link) 
   auto port = open_port(link);
   if (port) return std::move(*port);
   const std::string what = link.device + ": " + describe(port.error());
-  if (port.error().kind != Kind::kOpen && port.error().kind != Kind::kBusy) throw StartError(kInputOutput, what);
+  if (port.error().kind != Kind::open && port.error().kind != Kind::busy) throw StartError(kInputOutput, what);
   spdlog::warn("{}; waiting for it", what);
   return firmware_bridge::ClosedPort{};
 }

@@ -138,10 +138,10 @@ mavlink::EncodedFrame frame_of(std::uint8_t byte) {
 
 TEST(TransmitQueueOdometry, ASetpointTakesThePlaceOfOdometryThatWaits) {
   TransmitQueue queue;
-  queue.push(frame_of(1), Kind::kOdometry);
-  queue.push(frame_of(2), Kind::kOther);
-  queue.push(frame_of(3), Kind::kOdometry);
-  queue.push(frame_of(4), Kind::kSetpoint);
+  queue.push(frame_of(1), Kind::odometry);
+  queue.push(frame_of(2), Kind::other);
+  queue.push(frame_of(3), Kind::odometry);
+  queue.push(frame_of(4), Kind::setpoint);
   std::vector<std::uint8_t> order;
   ASSERT_TRUE(queue.flush([&](std::span<const std::uint8_t> b) -> tl::expected<std::size_t, PortError> {
     order.push_back(b[0]);
@@ -153,11 +153,11 @@ TEST(TransmitQueueOdometry, ASetpointTakesThePlaceOfOdometryThatWaits) {
 
 TEST(TransmitQueueOdometry, OdometryThatHasBegunIsFinishedBeforeTheSetpointAndANewOneTakesThePlaceOfTheOldAlone) {
   TransmitQueue queue;
-  queue.push(frame_of(1), Kind::kOdometry);
+  queue.push(frame_of(1), Kind::odometry);
   ASSERT_TRUE(queue.flush([](auto) -> tl::expected<std::size_t, PortError> { return 4U; }));
-  queue.push(frame_of(2), Kind::kSetpoint);
-  queue.push(frame_of(3), Kind::kOdometry);
-  queue.push(frame_of(4), Kind::kOdometry);
+  queue.push(frame_of(2), Kind::setpoint);
+  queue.push(frame_of(3), Kind::odometry);
+  queue.push(frame_of(4), Kind::odometry);
   std::vector<std::uint8_t> order;
   ASSERT_TRUE(queue.flush([&](std::span<const std::uint8_t> b) -> tl::expected<std::size_t, PortError> {
     order.push_back(b[0]);
@@ -188,7 +188,7 @@ TEST_F(LinkTest, ThinsOdometryAloneAndCountsIt) {
 TEST_F(LinkTest, TellsALineThatTakesNothingThoughNoSetpointWaits) {
   introduce_vehicle();
   int ms = 0, blocked_at = -1;
-  for (; ms < 5000 && link_.fault(kStart + std::chrono::milliseconds(ms)) != LinkFault::kTransmitStalled; ms += 20) {
+  for (; ms < 5000 && link_.fault(kStart + std::chrono::milliseconds(ms)) != LinkFault::transmit_stalled; ms += 20) {
     const Time now = kStart + std::chrono::milliseconds(ms);
     say_and_poll(px4_heartbeat(false, 1), now);  // it speaks, and does not listen
     for (int n = 0; n < 20; ++n) link_.send_statustext(6, "nobody reads this");

@@ -21,9 +21,9 @@ TEST_F(LinkTest, NamesALostHeartbeatAfterOneAndAHalfSeconds) {
   introduce_vehicle();
   EXPECT_EQ(link_.heartbeat_age(kStart + 100ms), 100ms);
   EXPECT_FALSE(link_.fault(kStart + 1499ms));
-  EXPECT_EQ(link_.fault(kStart + 1500ms), LinkFault::kHeartbeatLost);
+  EXPECT_EQ(link_.fault(kStart + 1500ms), LinkFault::heartbeat_lost);
   say_and_poll(mavlink::LocalPositionNed{}, kStart + 1500ms);
-  EXPECT_EQ(link_.fault(kStart + 1500ms), LinkFault::kHeartbeatLost) << "other messages are no heartbeat";
+  EXPECT_EQ(link_.fault(kStart + 1500ms), LinkFault::heartbeat_lost) << "other messages are no heartbeat";
   introduce_vehicle(kStart + 1600ms);
   EXPECT_FALSE(link_.fault(kStart + 1600ms));
 }
@@ -31,7 +31,7 @@ TEST_F(LinkTest, NamesALostHeartbeatAfterOneAndAHalfSeconds) {
 TEST_F(LinkTest, TellsAWrongBaudRateFromASilentLine) {
   EXPECT_FALSE(link_.heartbeat_age(kStart));
   EXPECT_FALSE(link_.fault(kStart + 1999ms));
-  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::kNothingReceived);
+  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::nothing_received);
   std::mt19937 random(3);
   Bytes garbage(500);
   for (auto& b : garbage) b = static_cast<std::uint8_t>(random());
@@ -41,7 +41,7 @@ TEST_F(LinkTest, TellsAWrongBaudRateFromASilentLine) {
     ::usleep(1000);
   }
   EXPECT_FALSE(link_.fault(kStart + 1999ms));
-  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::kNoValidFrame);
+  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::no_valid_frame);
   introduce_vehicle(kStart + 3s);
   EXPECT_FALSE(link_.fault(kStart + 3s));
 }
@@ -50,7 +50,7 @@ TEST_F(LinkTest, NoticesAnUnpluggedPortWithinOneTickAndStaysSilentAfterANewOne) 
   introduce_vehicle();
   far_.hang_up();
   EXPECT_FALSE(link_.poll(kStart + kTick));
-  EXPECT_EQ(link_.fault(kStart + kTick), LinkFault::kPortLost);
+  EXPECT_EQ(link_.fault(kStart + kTick), LinkFault::port_lost);
   EXPECT_FALSE(link_.send_setpoint({}, kStart + kTick));
 
   PseudoTerminal replacement;
@@ -74,7 +74,7 @@ TEST_F(LinkTest, NeverBlocksWhenNobodyReadsAndFlagsTheSecondMissedSetpoint) {
     s.p_W.z() = ticks;
     ASSERT_TRUE(link_.send_setpoint(s, now));
     if (first_missed == 0 && link_.transmit().missed_setpoints() == 1) first_missed = ticks;
-    if (link_.fault(now) == LinkFault::kTransmitStalled) break;
+    if (link_.fault(now) == LinkFault::transmit_stalled) break;
   }
   EXPECT_LT(std::chrono::steady_clock::now() - before, 2s);
   ASSERT_GT(first_missed, 1);
@@ -100,10 +100,10 @@ TEST_F(LinkTest, NeverBlocksWhenNobodyReadsAndFlagsTheSecondMissedSetpoint) {
 
 TEST_F(LinkTest, SendsNoOldSetpointAfterDiscarding) {
   introduce_vehicle();
-  for (int i = 0; i < 2000 && link_.fault(kStart) != LinkFault::kTransmitStalled; ++i) {
+  for (int i = 0; i < 2000 && link_.fault(kStart) != LinkFault::transmit_stalled; ++i) {
     ASSERT_TRUE(link_.send_setpoint({}, kStart));
   }
-  ASSERT_EQ(link_.fault(kStart), LinkFault::kTransmitStalled);
+  ASSERT_EQ(link_.fault(kStart), LinkFault::transmit_stalled);
   link_.discard_unsent();
   EXPECT_EQ(link_.transmit().waiting(), 0U);
   EXPECT_FALSE(link_.fault(kStart));
@@ -124,8 +124,8 @@ TEST(TransmitQueue, ASetpointThatGivesWayToOtherFramesIsMissed) {
   TransmitQueue queue;
   const auto frame = mavlink::encode_frame({1, 191, 0}, mavlink::Heartbeat{});
   for (int tick = 1; tick <= kMaxMissedSetpoints; ++tick) {
-    queue.push(frame, TransmitQueue::Kind::kSetpoint);
-    for (std::size_t n = 0; n < 2 * TransmitQueue::kCapacity; ++n) queue.push(frame, TransmitQueue::Kind::kOther);
+    queue.push(frame, TransmitQueue::Kind::setpoint);
+    for (std::size_t n = 0; n < 2 * TransmitQueue::kCapacity; ++n) queue.push(frame, TransmitQueue::Kind::other);
     EXPECT_EQ(queue.missed_setpoints(), tick);
   }
 }
@@ -143,9 +143,9 @@ TEST(TransmitQueue, FinishesAHalfWrittenFrameAndDropsTheOldestWholeOne) {
     room -= n;
     return n;
   };
-  queue.push(frame(0), TransmitQueue::Kind::kOther);
+  queue.push(frame(0), TransmitQueue::Kind::other);
   ASSERT_TRUE(queue.flush(write));
-  for (std::uint8_t i = 1; i < 20; ++i) queue.push(frame(i), TransmitQueue::Kind::kOther);
+  for (std::uint8_t i = 1; i < 20; ++i) queue.push(frame(i), TransmitQueue::Kind::other);
   EXPECT_EQ(queue.waiting(), TransmitQueue::kCapacity);
   EXPECT_EQ(queue.dropped(), 4U);
   room = 100'000;
@@ -209,7 +209,7 @@ TEST_F(LinkTest, NoticesAnUnpluggedPortWhereItWrites) {
   introduce_vehicle();
   far_.hang_up();
   EXPECT_FALSE(link_.send_heartbeat());
-  EXPECT_EQ(link_.fault(kStart), LinkFault::kPortLost);
+  EXPECT_EQ(link_.fault(kStart), LinkFault::port_lost);
 }
 
 /// ms of the controller's clock at 1 ms after kStart: its 32 bits wrap soon.

@@ -50,10 +50,10 @@ TEST(SerialPort, ReportsAHangUpOnReadAndOnWrite) {
   std::array<std::uint8_t, 8> bytes{};
   const auto read = port->read(bytes);
   ASSERT_FALSE(read);
-  EXPECT_EQ(read.error().kind, Kind::kLost);
+  EXPECT_EQ(read.error().kind, Kind::lost);
   const auto written = port->write(bytes);
   ASSERT_FALSE(written);
-  EXPECT_EQ(written.error().kind, Kind::kLost);
+  EXPECT_EQ(written.error().kind, Kind::lost);
 }
 
 TEST(SerialPort, TakesNoMoreThanTheKernelHasRoomForAndNeverBlocks) {
@@ -94,9 +94,9 @@ TEST(SerialPort, DiscardsWhatTheKernelHasNotSent) {
 
 TEST(SerialPort, NamesWhyItCannotBeOpened) {
   PseudoTerminal far;
-  EXPECT_EQ(SerialPort::open("/nonexistent/tty", 115200).error().kind, Kind::kOpen);
-  EXPECT_EQ(SerialPort::open("/dev/null", 115200).error().kind, Kind::kNotSerial);
-  EXPECT_EQ(SerialPort::open(far.path(), 0).error().kind, Kind::kBaudRate);
+  EXPECT_EQ(SerialPort::open("/nonexistent/tty", 115200).error().kind, Kind::open);
+  EXPECT_EQ(SerialPort::open("/dev/null", 115200).error().kind, Kind::not_serial);
+  EXPECT_EQ(SerialPort::open(far.path(), 0).error().kind, Kind::baud_rate);
   EXPECT_NE(describe(SerialPort::open("/nonexistent/tty", 115200).error()).find("No such file"), std::string::npos);
 }
 
@@ -108,7 +108,7 @@ TEST(SerialPort, IsBusyForAnyOtherProcessRootsToo) {
   const pid_t other = ::fork();
   if (other == 0) {
     const auto second = SerialPort::open(far.path(), 57600);
-    ::_exit(!second && second.error().kind == Kind::kBusy ? 5 : 1);
+    ::_exit(!second && second.error().kind == Kind::busy ? 5 : 1);
   }
   int status = 0;
   ::waitpid(other, &status, 0);
@@ -221,7 +221,7 @@ TEST(UdpPort, OutlivesAPeerThatIsNotThere) {
 }
 
 TEST(UdpPort, NamesAnAddressThatIsNone) {
-  EXPECT_EQ(UdpPort::open({"nowhere", 0}, std::nullopt).error().kind, Kind::kAddress);
+  EXPECT_EQ(UdpPort::open({"nowhere", 0}, std::nullopt).error().kind, Kind::address);
 }
 
 }  // namespace

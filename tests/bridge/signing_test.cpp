@@ -65,7 +65,7 @@ TEST_F(SigningVectors, SignsToTheSameBytesAndTakesThem) {
     Signing sender(key, s["link_id"], time - 1), receiver(key, 0, time);
     ASSERT_TRUE(sender.sign(frame));
     EXPECT_EQ(Bytes(frame.view().begin(), frame.view().end()), expected);
-    EXPECT_EQ(judge(receiver, expected), std::vector{SignatureVerdict::kGood});
+    EXPECT_EQ(judge(receiver, expected), std::vector{SignatureVerdict::good});
     ++checked;
   }
   EXPECT_EQ(checked, 4);
@@ -79,10 +79,10 @@ TEST_F(SigningVectors, RefusesWhatTheReferenceParserRefuses) {
   };
   const auto key = key_of("e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
   Signing bad(key, 0, 0), replayed(key, 0, 0);
-  EXPECT_EQ(judge(bad, bytes_of("signed_bad_signature")), std::vector{SignatureVerdict::kWrongSignature});
+  EXPECT_EQ(judge(bad, bytes_of("signed_bad_signature")), std::vector{SignatureVerdict::wrong_signature});
   EXPECT_EQ(bad.time(), 0U) << "a bad signature teaches no time";
   EXPECT_EQ(judge(replayed, bytes_of("signed_replayed")),
-            (std::vector{SignatureVerdict::kGood, SignatureVerdict::kReplayed}));
+            (std::vector{SignatureVerdict::good, SignatureVerdict::replayed}));
 }
 
 TEST(SigningTest, NoFlippedBitOfASignedFrameIsTaken) {
@@ -91,18 +91,18 @@ TEST(SigningTest, NoFlippedBitOfASignedFrameIsTaken) {
   for (std::size_t bit = 0; bit < good.size() * 8; ++bit) {
     Bytes bad = good;
     bad[bit / 8] = static_cast<std::uint8_t>(bad[bit / 8] ^ 1U << bit % 8);
-    for (const auto verdict : judge(receiver, bad)) EXPECT_NE(verdict, SignatureVerdict::kGood) << bit;
+    for (const auto verdict : judge(receiver, bad)) EXPECT_NE(verdict, SignatureVerdict::good) << bit;
   }
   EXPECT_EQ(receiver.counters().wrong_signature, mavlink::kSignature * 8) << "all else fails by its checksum";
-  EXPECT_EQ(judge(receiver, good), std::vector{SignatureVerdict::kGood});
+  EXPECT_EQ(judge(receiver, good), std::vector{SignatureVerdict::good});
 }
 
 TEST(SigningTest, TheTimeOfAStreamMustRise) {
   Signing sender(kKey, 3, kNow), receiver(kKey, 0, kNow);
   const Bytes first = signed_bytes(sender, mavlink::Heartbeat{}), second = signed_bytes(sender, mavlink::Heartbeat{});
-  EXPECT_EQ(judge(receiver, second), std::vector{SignatureVerdict::kGood});
-  EXPECT_EQ(judge(receiver, first), std::vector{SignatureVerdict::kReplayed});
-  EXPECT_EQ(judge(receiver, second), std::vector{SignatureVerdict::kReplayed});
+  EXPECT_EQ(judge(receiver, second), std::vector{SignatureVerdict::good});
+  EXPECT_EQ(judge(receiver, first), std::vector{SignatureVerdict::replayed});
+  EXPECT_EQ(judge(receiver, second), std::vector{SignatureVerdict::replayed});
   EXPECT_EQ(receiver.counters().replayed, 2U);
 }
 
@@ -112,23 +112,23 @@ TEST(SigningTest, EachSystemComponentAndLinkIsAStreamOfItsOwn) {
     Signing sender(kKey, static_cast<std::uint8_t>(link), kNow);
     const Bytes bytes = signed_bytes(sender, mavlink::Heartbeat{}, static_cast<std::uint8_t>(component),
                                      static_cast<std::uint8_t>(system));
-    EXPECT_EQ(judge(receiver, bytes), std::vector{SignatureVerdict::kGood});
-    EXPECT_EQ(judge(receiver, bytes), std::vector{SignatureVerdict::kReplayed});
+    EXPECT_EQ(judge(receiver, bytes), std::vector{SignatureVerdict::good});
+    EXPECT_EQ(judge(receiver, bytes), std::vector{SignatureVerdict::replayed});
   }
 }
 
 TEST(SigningTest, ANewStreamMayBeAMinuteBehindAndNoMore) {
   Signing minute(kKey, 0, kNow - mavlink::kOldestNewStream - 1), older(kKey, 1, kNow - mavlink::kOldestNewStream - 2);
   Signing receiver(kKey, 0, kNow);
-  EXPECT_EQ(judge(receiver, signed_bytes(older, mavlink::Heartbeat{})), std::vector{SignatureVerdict::kOld});
-  EXPECT_EQ(judge(receiver, signed_bytes(minute, mavlink::Heartbeat{})), std::vector{SignatureVerdict::kGood});
+  EXPECT_EQ(judge(receiver, signed_bytes(older, mavlink::Heartbeat{})), std::vector{SignatureVerdict::old});
+  EXPECT_EQ(judge(receiver, signed_bytes(minute, mavlink::Heartbeat{})), std::vector{SignatureVerdict::good});
   EXPECT_EQ(receiver.counters().old, 1U);
 }
 
 TEST(SigningTest, OurTimeFollowsTheNewestGoodSignatureAndNeverGoesBack) {
   Signing ahead(kKey, 0, kNow + 500), receiver(kKey, 0, kNow), other_key({9}, 0, kNow + 10'000);
   EXPECT_EQ(judge(receiver, signed_bytes(other_key, mavlink::Heartbeat{})),
-            std::vector{SignatureVerdict::kWrongSignature});
+            std::vector{SignatureVerdict::wrong_signature});
   EXPECT_EQ(receiver.time(), kNow);
   judge(receiver, signed_bytes(ahead, mavlink::Heartbeat{}));
   EXPECT_EQ(receiver.time(), kNow + 501);
@@ -146,8 +146,8 @@ TEST(SigningTest, KeepsABoundedNumberOfStreams) {
     Signing sender(kKey, static_cast<std::uint8_t>(i), kNow);
     verdicts.push_back(judge(receiver, signed_bytes(sender, mavlink::Heartbeat{})).at(0));
   }
-  EXPECT_EQ(std::ranges::count(verdicts, SignatureVerdict::kGood), static_cast<long>(Signing::kStreams));
-  EXPECT_EQ(verdicts.back(), SignatureVerdict::kNoRoom);
+  EXPECT_EQ(std::ranges::count(verdicts, SignatureVerdict::good), static_cast<long>(Signing::kStreams));
+  EXPECT_EQ(verdicts.back(), SignatureVerdict::no_room);
 }
 
 /// The link with a key, and a controller that signs with the same one.
@@ -169,7 +169,7 @@ TEST_F(SignedLinkTest, ActsUponNoFrameThatIsUnsignedWronglySignedOrReplayed) {
   poll_until_arrived(2);
   EXPECT_FALSE(link_.vehicle());
   EXPECT_FALSE(link_.send_setpoint({}, kStart));
-  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::kNoneSignedRightly);
+  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::none_signed_rightly);
 
   say_signed(px4_heartbeat(false, 1), controller_);
   poll_until_arrived(3);
@@ -196,7 +196,7 @@ TEST_F(SignedLinkTest, SignsEachFrameWithATimeThatRisesWithTheMonotonicClock) {
   ::usleep(20'000);
   Signing receiver(kKey, 0, kNow);
   const auto verdicts = judge(receiver, far_.read());
-  EXPECT_EQ(verdicts, std::vector<SignatureVerdict>(7, SignatureVerdict::kGood));
+  EXPECT_EQ(verdicts, std::vector<SignatureVerdict>(7, SignatureVerdict::good));
   EXPECT_EQ(receiver.time(), kNow + 10 * kSigningSecond + 1);
 }
 
@@ -221,7 +221,7 @@ TEST_F(SignedLinkTest, TellsAnAutopilotWithAnOldClockTheTime) {
   poll_until_arrived(5);
   EXPECT_FALSE(link_.vehicle());
   const Bytes told = far_.await();
-  EXPECT_EQ(judge(behind, told), std::vector{SignatureVerdict::kGood}) << "once a second, and not at each frame";
+  EXPECT_EQ(judge(behind, told), std::vector{SignatureVerdict::good}) << "once a second, and not at each frame";
   say_signed(px4_heartbeat(false, 1), behind);
   poll_until_arrived(6);
   EXPECT_EQ(link_.vehicle(), kVehicle) << "an autopilot that goes by what it hears is now heard";

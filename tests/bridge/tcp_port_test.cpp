@@ -55,7 +55,7 @@ TEST(TcpPort, CarriesEveryByteValueUnchangedBothWaysAndReportsThatThePeerHasClos
   }
   const auto n = port->read(bytes);
   ASSERT_FALSE(n) << "closed by the peer";
-  EXPECT_EQ(n.error().kind, Kind::kLost);
+  EXPECT_EQ(n.error().kind, Kind::lost);
 }
 
 TEST(TcpPort, TakesNoMoreThanTheKernelHasRoomForAndNeverBlocks) {
@@ -92,16 +92,16 @@ TEST(TcpPort, LosesAPeerThatVanishedWhileNothingWasSent) {
     n = port->read(bytes);
   }
   ASSERT_FALSE(n) << "after 6 s";
-  EXPECT_EQ(n.error().kind, Kind::kLost);
+  EXPECT_EQ(n.error().kind, Kind::lost);
 }
 
 TEST(TcpPort, NamesWhyItCannotBeOpened) {
   std::uint16_t closed_port = 0;
   { closed_port = Listener().port(); }
   const auto refused = TcpPort::open("127.0.0.1", closed_port, std::chrono::milliseconds(500));
-  EXPECT_EQ(refused.error().kind, Kind::kOpen);
+  EXPECT_EQ(refused.error().kind, Kind::open);
   EXPECT_NE(describe(refused.error()).find("refused"), std::string::npos);
-  EXPECT_EQ(TcpPort::open("nowhere", 1, std::chrono::milliseconds(1)).error().kind, Kind::kAddress);
+  EXPECT_EQ(TcpPort::open("nowhere", 1, std::chrono::milliseconds(1)).error().kind, Kind::address);
 }
 
 }  // namespace

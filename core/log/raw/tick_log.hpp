@@ -13,14 +13,14 @@ namespace backwash::log {
 
 /// Bits of TickRecord::asked.
 enum Asked : std::uint32_t {
-  kAskedSetpoint = 1,
-  kAskedHeartbeat = 2,  ///< the mode allows it; it is sent once a second
-  kAskedOdometry = 4,
-  kAskedOffboard = 8,
-  kAskedLand = 16,
-  kAskedArm = 32,
-  kAskedDisarm = 64,
-  kAskedTakeoff = 128,
+  kAskedSetpoint = 1u << 0,
+  kAskedHeartbeat = 1u << 1,  ///< the mode allows it; it is sent once a second
+  kAskedOdometry = 1u << 2,
+  kAskedOffboard = 1u << 3,
+  kAskedLand = 1u << 4,
+  kAskedArm = 1u << 5,
+  kAskedDisarm = 1u << 6,
+  kAskedTakeoff = 1u << 7,
 };
 
 /// Real-time: wait-free, no allocation.

@@ -99,9 +99,9 @@ track::AutopilotFacts ControlLoop::autopilot(std::int64_t now_ns) const noexcept
   facts.armed = !status || status->value.armed;
   facts.offboard = status && status->value.follows_setpoints;
   using firmware_bridge::LandedState;
-  if (const auto said = telemetry.landed_state.at(now); said && said->value != LandedState::kUndefined) {
-    facts.landed = said->value == LandedState::kOnGround;
-    facts.in_air = said->value == LandedState::kInAir;
+  if (const auto said = telemetry.landed_state.at(now); said && said->value != LandedState::undefined) {
+    facts.landed = said->value == LandedState::on_ground;
+    facts.in_air = said->value == LandedState::in_air;
   }
   facts.lifts_itself = status && status->value.autopilot->lifts_itself;
   const auto taken = telemetry.result_of(firmware_bridge::kCommandTakeoff);

@@ -83,7 +83,7 @@ tl::expected<Port, PortError> open_port(const decltype(config::Daemon::link)& li
     case config::LinkDevice::Kind::tcp:
       return TcpPort::open(address, port, std::chrono::milliseconds(500)).map(as_port);
   }
-  return tl::unexpected(PortError{PortError::Kind::kAddress});
+  return tl::unexpected(PortError{PortError::Kind::address});
 }
 
 tl::expected<LineRate, std::string> configured_line(const decltype(config::Daemon::link)& link,
@@ -120,11 +120,11 @@ void LinkWatch::step() {
   const std::uint32_t losses = channels_.port_losses.load(std::memory_order_relaxed);
   const std::optional<LinkFault> fault = channels_.link_fault.load(std::memory_order_relaxed);
   if (std::exchange(losses_, losses) != losses)
-    spdlog::error("{}: {}, loss {}", link_.device, name(LinkFault::kPortLost), losses);
+    spdlog::error("{}: {}, loss {}", link_.device, name(LinkFault::port_lost), losses);
   if (fault != fault_) {
     if (!fault)
       spdlog::info("{}: link good", link_.device);
-    else if (*fault != LinkFault::kPortLost)
+    else if (*fault != LinkFault::port_lost)
       spdlog::error("{}: {}", link_.device, name(*fault));
     fault_ = fault;
   }

@@ -101,7 +101,7 @@ class Controller {
 
   bool on_ground() const {
     const auto said = vehicle_.telemetry().landed_state.at(now_);
-    return said && said->value == LandedState::kOnGround;
+    return said && said->value == LandedState::on_ground;
   }
 
   void say_state() {

@@ -49,7 +49,7 @@ TEST_F(PlainLinkTest, AControllersStateIsTelemetry) {
   EXPECT_EQ(t.local_state.at(kStart)->value.v_W, Vec3(0.5, 0.25, -0.125));
   EXPECT_LT((t.attitude.at(kStart)->value.q_LB * Vec3::UnitX() - Vec3::UnitY()).norm(), 1e-6);
   EXPECT_LT((t.attitude.at(kStart)->value.omega_B - Vec3(0.1, 0.2, -0.3)).norm(), 1e-6);
-  EXPECT_EQ(t.landed_state.at(kStart)->value, LandedState::kInAir);
+  EXPECT_EQ(t.landed_state.at(kStart)->value, LandedState::in_air);
   EXPECT_EQ(t.reset_counter.at(kStart)->value, 3);
   EXPECT_NEAR(*t.battery.at(kStart)->value.voltage, 15.6, 1e-9);
   EXPECT_NEAR(*t.battery.at(kStart)->value.remaining, 0.87, 1e-9);
@@ -62,7 +62,7 @@ TEST_F(PlainLinkTest, AControllersStateIsTelemetry) {
   poll_until(12);
   EXPECT_FALSE(t.status.at(kStart)->value.follows_setpoints);
   EXPECT_EQ(t.status.at(kStart)->value.system_status, 5);
-  EXPECT_EQ(t.landed_state.at(kStart)->value, LandedState::kOnGround);
+  EXPECT_EQ(t.landed_state.at(kStart)->value, LandedState::on_ground);
 }
 
 TEST_F(PlainLinkTest, AControllerThatKnowsNoPoseYetIsHeardAndSentPoses) {
@@ -176,12 +176,12 @@ TEST_F(PlainLinkTest, WhatThePlainLinkHasNoFrameForIsNotSent) {
 }
 
 TEST_F(PlainLinkTest, RefusedFramesCountAndNameAWrongBaudRate) {
-  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::kNothingReceived);
+  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::nothing_received);
   Bytes bad = wire(flying());
   bad[20] ^= 1;
   far_.write(bad);
   poll_until(0, 1);
-  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::kNoValidFrame);
+  EXPECT_EQ(link_.fault(kStart + 2s), LinkFault::no_valid_frame);
   far_.write(Bytes(1000, 0x55));  // not one delimiter
   poll_until(0, 3);
   EXPECT_FALSE(link_.vehicle());
@@ -194,9 +194,9 @@ TEST_F(PlainLinkTest, AFullLineShowsAsMissedSetpointsAndFramesStayWhole) {
   say(flying());
   poll_until(6);
   int sent = 0;
-  for (; sent < 2000 && link_.fault(kStart) != LinkFault::kTransmitStalled; ++sent)
+  for (; sent < 2000 && link_.fault(kStart) != LinkFault::transmit_stalled; ++sent)
     ASSERT_TRUE(link_.send_setpoint({}, kStart));
-  EXPECT_EQ(link_.fault(kStart), LinkFault::kTransmitStalled);
+  EXPECT_EQ(link_.fault(kStart), LinkFault::transmit_stalled);
   std::vector<plain_event_t> all;
   for (int i = 0; i < 100; ++i) {
     const auto some = events(receiver_, far_.read());
@@ -214,7 +214,7 @@ TEST_F(PlainLinkTest, AHangUpIsALostPort) {
   poll_until(6);
   far_.hang_up();
   EXPECT_FALSE(link_.poll(kStart));
-  EXPECT_EQ(link_.fault(kStart), LinkFault::kPortLost);
+  EXPECT_EQ(link_.fault(kStart), LinkFault::port_lost);
 }
 
 // What the plain link makes up of a controller's state: nothing that it does not know, no answer to another request.
@@ -259,7 +259,7 @@ TEST_F(PlainAnswers, AControllerThatDoesNotKnowTheGroundIsNeitherOnItNorInTheAir
   s.ground_known = true;
   say(s);
   ASSERT_TRUE(link_.telemetry().landed_state.at(kStart));
-  EXPECT_EQ(link_.telemetry().landed_state.at(kStart)->value, LandedState::kInAir);
+  EXPECT_EQ(link_.telemetry().landed_state.at(kStart)->value, LandedState::in_air);
 }
 
 TEST_F(PlainAnswers, AnAnswerToAnEarlierRequestIsNoneToThisOne) {

@@ -34,7 +34,7 @@ TEST(PortLossFault, UnpluggedIsQuietAtOnceAndAFreshPortResumesNothing) {
   rig.tick();
   EXPECT_EQ(rig.mode(), Mode::quiet);
   EXPECT_EQ(rig.reason(), Reason::port_lost);
-  EXPECT_EQ(rig.channels->link_fault.load(), firmware_bridge::LinkFault::kPortLost);
+  EXPECT_EQ(rig.channels->link_fault.load(), firmware_bridge::LinkFault::port_lost);
   const std::size_t from = rig.log.size();
   rig.ticks(10);
   EXPECT_EQ(frames_out(rig, from), 0);
@@ -61,7 +61,7 @@ TEST(PortLossFault, TheLinkWatchOpensTheLostPortAgain) {
   LinkWatch watch(channels, serial(line.path()), kNobody);
   watch.step();
   EXPECT_EQ(channels.ports.take(), nullptr);
-  channels.link_fault = firmware_bridge::LinkFault::kPortLost;
+  channels.link_fault = firmware_bridge::LinkFault::port_lost;
   channels.port_losses = 1;
   watch.step();
   const auto* port = channels.ports.take();
@@ -85,7 +85,7 @@ TEST(PortLossFault, APortThatIsMissingAtTheStartIsOpenedWhenItAppears) {
     watch.step();
   };
   for (std::int64_t n = 0; n < 5; ++n) together(n * 20'000'000);
-  EXPECT_EQ(channels->link_fault.load(), firmware_bridge::LinkFault::kPortLost);
+  EXPECT_EQ(channels->link_fault.load(), firmware_bridge::LinkFault::port_lost);
   std::filesystem::create_symlink(line.path(), path);
   for (std::int64_t n = 5; n < 10; ++n) together(n * 20'000'000);
   std::filesystem::remove(path);
@@ -104,14 +104,14 @@ TEST(PortLossFault, APortThatIsLostAgainBeforeTheWatchLooksIsOpenedAgain) {
   rig.plug_in();
   rig.hang_up();
   rig.ticks(3);
-  EXPECT_EQ(rig.channels->link_fault.load(), firmware_bridge::LinkFault::kPortLost);
+  EXPECT_EQ(rig.channels->link_fault.load(), firmware_bridge::LinkFault::port_lost);
   EXPECT_EQ(rig.channels->port_losses, 2u);
 
   firmware_bridge::test::PseudoTerminal line;
   Channels channels;
   LinkWatch watch(channels, serial(line.path()), kNobody);
   for (std::uint32_t losses = 1; losses <= 3; ++losses) {
-    channels.link_fault = firmware_bridge::LinkFault::kPortLost;
+    channels.link_fault = firmware_bridge::LinkFault::port_lost;
     channels.port_losses = losses;
     watch.step();
     const auto* port = channels.ports.take();
@@ -181,8 +181,8 @@ TEST(BaudRateFault, AWrongBaudRateIsANamedErrorAfterTwoSeconds) {
   rig.ticks(99);
   EXPECT_EQ(rig.channels->link_fault.load(), std::nullopt);
   rig.ticks(2);
-  ASSERT_EQ(rig.channels->link_fault.load(), firmware_bridge::LinkFault::kNoValidFrame);
-  EXPECT_EQ(name(firmware_bridge::LinkFault::kNoValidFrame), "no valid frame (wrong baud rate?)");
+  ASSERT_EQ(rig.channels->link_fault.load(), firmware_bridge::LinkFault::no_valid_frame);
+  EXPECT_EQ(name(firmware_bridge::LinkFault::no_valid_frame), "no valid frame (wrong baud rate?)");
   EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
   rig.tick();
   EXPECT_EQ(rig.mode(), Mode::passive);
