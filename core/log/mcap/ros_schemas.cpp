@@ -110,7 +110,7 @@ std::string ros_schema(std::string_view type) {
   std::vector<std::string_view> needed;
   add_needed(text, needed);
   for (const auto& other : needed)
-    text += std::string(80, '=') + "\nMSG: " + std::string(other) + "\n" + std::string(definition(other).members);
+    text.append(80, '=').append("\nMSG: ").append(other).append("\n").append(definition(other).members);
   return text;
 }
 

@@ -149,7 +149,8 @@ std::string drawn(const Layer& layer, const Frame& f) {
     places += run.size();
     const char* to = "M";
     for (const auto& place : run) {
-      path += to + f.at(place);
+      path += to;
+      path += f.at(place);
       if (layer.shape == Shape::dots) path += "h0";
       to = layer.shape == Shape::dots ? "M" : "L";
     }
