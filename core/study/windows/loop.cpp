@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
-#include <utility>
 
 #include "core/log/columns/log_columns.hpp"
 #include "core/study/windows/gates/window_rules.hpp"
@@ -79,20 +77,13 @@ LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, double drag
   Place place(log);
   State now{log.commands.front().p_W, Vec3::Zero()};
   Vec3 a = Vec3::Zero();
-  std::deque<std::pair<double, State>> past;  // from the state on that the controller feels
   for (std::size_t i = 0; i < log.t.size(); ++i) {
     const double dt = i > 0 ? log.t[i] - log.t[i - 1] : 0;
     const bool gap = dt > kWindowRules.restart;
-    if (gap) {
-      now = {log.p[i], log.v[i]};
-      past.clear();
-    }
+    if (gap) now = {log.p[i], log.v[i]};
     for (int k = 0; k < pieces(dt); ++k) {
       const double h = gap ? 0 : dt / pieces(dt), t = log.t[i] - dt + (k + 1) * h;
-      past.emplace_back(t - h, now);
-      while (past.size() > 1 && past[1].first <= t - h - loop.feedback_delay + kWindowRules.stamp_error)
-        past.pop_front();
-      a = loop.after(a, loop.asked(place.at(t - loop.latency).command(), past.front().second), h);
+      a = loop.after(a, loop.asked(place.at(t - loop.latency).command(), now), h);
       now.v_W += h * (a - drag * Vec3(now.v_W.x(), now.v_W.y(), 0));
       now.p_W += h * now.v_W;
     }
