@@ -182,8 +182,16 @@ plan::World Worlds::make(const Calibrated& air, const Way& way, const Parallel& 
                std::span(voxels_).subspan(begin, end - begin), way.margin);
   });
   plan::SafeSpace safe(hover.safe_voxels());
-  return {place_.grid,     place_.distance, place_.sums, std::move(bounds), std::move(hover),
-          std::move(safe), reach_,          response_,   way.margin};
+  return {.model = plan::with_vehicle(model, reach_.vehicle),
+          .grid = place_.grid,
+          .distance = place_.distance,
+          .sums = place_.sums,
+          .bounds = std::move(bounds),
+          .hover = std::move(hover),
+          .safe = std::move(safe),
+          .reach = reach_,
+          .response = response_,
+          .constant_margin = way.margin};
 }
 
 plan::Plan planned(const plan::World& world, const sim::RoutePair& pair, double v_max) {

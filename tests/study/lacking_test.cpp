@@ -43,7 +43,7 @@ Observations changed(Change change, std::vector<std::string> effects = {}, doubl
 std::string told(const Observations& seen) {
   StudyOptions options;
   options.minimum_detectable = false;
-  return study_worlds::told(study(seen, options));
+  return study_worlds::told(backwash::study::study(seen, options));
 }
 
 std::string why_not(const std::string& cause, const Observations& seen) {

@@ -17,7 +17,6 @@
 namespace {
 
 using namespace study_worlds;
-namespace study = backwash::study;
 
 WorldOutcome told_of(const std::string& hidden, std::vector<std::vector<std::string>> sets,
                      std::vector<std::string> unknown = {}) {
@@ -104,12 +103,13 @@ TEST(StudyMatrix, ReadsTheOutcomesThatItWrote) {
 TEST(Evidence, DecorrelatedAxesKeepEachWindowsSumOfSquares) {
   std::mt19937 rng(7);
   std::normal_distribution draw;
-  study::DesignColumn column{{{study::kVarZ, {}}, {study::kVarX, {}}, {study::kTail, {}}}};
+  backwash::study::DesignColumn column{
+      {{backwash::study::kVarZ, {}}, {backwash::study::kVarX, {}}, {backwash::study::kTail, {}}}};
   for (auto& part : column.parts)
     for (int i = 0; i < 9; ++i) part.x.push_back(draw(rng));
-  const auto turned = study::decorrelated(column);
+  const auto turned = backwash::study::decorrelated(column);
   for (std::size_t i = 0; i < 9; ++i) {
-    const auto square = [i](const study::DesignColumn& c) {
+    const auto square = [i](const backwash::study::DesignColumn& c) {
       double sum = 0;
       for (const auto& part : c.parts) sum += part.x[i] * part.x[i];
       return sum;
@@ -119,13 +119,13 @@ TEST(Evidence, DecorrelatedAxesKeepEachWindowsSumOfSquares) {
 }
 
 /// Share of the variance of a window's height within its dwell that the vertical residual explains.
-double height_answers_gusts(const study::Observations& seen) {
+double height_answers_gusts(const backwash::study::Observations& seen) {
   double hy = 0, hh = 0, yy = 0;
   std::map<std::pair<std::size_t, int>, std::array<double, 3>> dwells;  // count, height, residual
   const auto each = [&](auto use) {
     for (std::size_t i = 0; i < seen.windows.size(); ++i)
-      if (const auto& w = seen.windows[i]; w.segment && seen.weight[study::kMeanZ][i] > 0)
-        use(dwells[{w.flight, *w.segment}], w.p_W.z(), seen.y[study::kMeanZ][i]);
+      if (const auto& w = seen.windows[i]; w.segment && seen.weight[backwash::study::kMeanZ][i] > 0)
+        use(dwells[{w.flight, *w.segment}], w.p_W.z(), seen.y[backwash::study::kMeanZ][i]);
   };
   each([](auto& d, double h, double y) {
     d[0] += 1;

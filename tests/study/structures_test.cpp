@@ -12,6 +12,7 @@
 #include "tests/study_worlds/observe.hpp"
 #include "tests/study_worlds/oracle.hpp"
 
+namespace structures {
 namespace {
 
 using namespace backwash;
@@ -49,7 +50,7 @@ Observations quiet(std::uint64_t seed = 4711) {
 StudyResult studied(const Observations& seen) {
   StudyOptions options;
   options.minimum_detectable = false;
-  return study::study(seen, options);
+  return backwash::study::study(seen, options);
 }
 
 TEST(Structures, AGustOfOneFrequencyCommonToAllFlightsIsToldWithItsFrequency) {
@@ -175,3 +176,4 @@ TEST(StudyWorlds, UnknownsAreAFamilyAndNotAFewShapes) {
 }
 
 }  // namespace
+}  // namespace structures
