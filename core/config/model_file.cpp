@@ -16,7 +16,8 @@
 namespace backwash::config {
 namespace {
 
-constexpr Range kVariance{0, 100};       // (m/s²)², amplitudes too
+constexpr Range kVariance{0, 100};       // (m/s²)²
+constexpr Range kAmplitude{0, 1e4};      // (m/s²)²/m², of what decays to a half within 0.12 m and more
 constexpr Range kLength{0, 20, true};    // m
 constexpr Range kAngle{0, 1.571, true};  // rad, up to π/2 as people round it
 constexpr Range kDecay{0, 1000, true};   // 1/m²
@@ -35,8 +36,8 @@ std::vector<Key> model_keys(Model& m) {
       {"ground.r0", &m.ground.r0, {0, 5, true}, optional, "m", "footprint; the vehicle's `body.diagonal_radius` takes its place"},
       {"ground.lambda.horizontal", &m.ground.lambda.horizontal, kVariance, required, "(m/s²)²", "λ_g", "hovers at several heights over a floor"},
       {"ground.lambda.vertical", &m.ground.lambda.vertical, kVariance, required, "(m/s²)²", "along z"},
-      {"ground.k1.horizontal", &m.ground.k1.horizontal, kVariance, required, "(m/s²)²/m²", "k_g1"},
-      {"ground.k1.vertical", &m.ground.k1.vertical, kVariance, required, "(m/s²)²/m²", "along z"},
+      {"ground.k1.horizontal", &m.ground.k1.horizontal, kAmplitude, required, "(m/s²)²/m²", "k_g1"},
+      {"ground.k1.vertical", &m.ground.k1.vertical, kAmplitude, required, "(m/s²)²/m²", "along z"},
       {"ground.k2", &m.ground.k2, kDecay, required, "1/m²", "k_g2"},
       {"corner.phi_max", &m.corner.phi_max, kAngle, required, "rad", "gate φ̄_c"},
       {"corner.l_max", &m.corner.l_max, kLength, required, "m", "gate l̄_c"},
@@ -45,9 +46,9 @@ std::vector<Key> model_keys(Model& m) {
       {"corner.lambda.vertical", &m.corner.lambda.vertical, kVariance, required, "(m/s²)²", "vertical"},
       {"wall.theta_min", &m.wall.theta_min, kAngle, required, "rad", "gate θ_w"},
       {"wall.l_max", &m.wall.l_max, kLength, required, "m", "gate l̄_w"},
-      {"wall.k1.normal", &m.wall.k1.normal, kVariance, required, "(m/s²)²/m²", "k_w1 across the wall", "hovers at several distances from a wall"},
-      {"wall.k1.tangential", &m.wall.k1.tangential, kVariance, required, "(m/s²)²/m²", "along it"},
-      {"wall.k1.vertical", &m.wall.k1.vertical, kVariance, required, "(m/s²)²/m²", "vertical"},
+      {"wall.k1.normal", &m.wall.k1.normal, kAmplitude, required, "(m/s²)²/m²", "k_w1 across the wall", "hovers at several distances from a wall"},
+      {"wall.k1.tangential", &m.wall.k1.tangential, kAmplitude, required, "(m/s²)²/m²", "along it"},
+      {"wall.k1.vertical", &m.wall.k1.vertical, kAmplitude, required, "(m/s²)²/m²", "vertical"},
       {"wall.k2", &m.wall.k2, kDecay, required, "1/m²", "k_w2"},
       {"bound.kappa", &m.bound.kappa, {0, 10}, optional, "", "standard deviations in the bound", "chosen"},
       {"bound.mean.horizontal", &m.bound.mean_horizontal, {0, 10}, with_parent, "m/s²", "largest steady push", "mean of w over long hovers, with set-points in the log", "0"},

@@ -176,6 +176,20 @@ void write_file(const std::string& path, const std::string& content, bool force)
   write_stream(path, force, [&](std::ostream& file) { file << content; });
 }
 
+void write_model_file(const std::string& path, const std::string& content, bool force) {
+  const auto tried =
+      std::filesystem::temp_directory_path() / ("backwash-" + std::to_string(::getpid()) + ".model.toml");
+  write_file(tried, content, true);
+  const auto model = config::load_model(tried);
+  const auto terms = config::load_simulation(tried);
+  std::filesystem::remove(tried);
+  std::string why = !model ? model.error().message : !terms ? terms.error().message : "";
+  if (why.empty()) return write_file(path, content, force);
+  if (why.starts_with(tried.string())) why.erase(0, tried.string().size());
+  throw Failure(kBadData, path + (why.starts_with(":") ? "" : ":1: ") + why +
+                              "; it is not written: the flights do not determine this number (see its interval)");
+}
+
 void write_log(const std::string& path, const log::FlightLog& log, bool force) {
   write_whole(path, force, [&](const std::string& to) { return log::write_csv(to, log, true).has_value(); });
 }

@@ -58,6 +58,9 @@ void check_outputs(const std::vector<std::string>& paths, bool force);
 /// Writes a whole file; one that is replaced stays until the new one is complete. Throws Failure 73 (exists, cannot be
 /// created) or 74 (cannot be written).
 void write_file(const std::string& path, const std::string& content, bool force);
+/// write_file() of a model that was read back before: what load_model or load_simulation refuses is not written. Throws
+/// Failure 65 with the key and what it holds too.
+void write_model_file(const std::string& path, const std::string& content, bool force);
 /// The same by what `write` puts onto a stream, which is not held in memory.
 void write_stream(const std::string& path, bool force, const std::function<void(std::ostream&)>& write);
 /// The same of a flight log.

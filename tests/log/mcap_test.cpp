@@ -12,6 +12,7 @@
 
 #include "core/log/mcap/mcap_flight.hpp"
 #include "core/log/mcap/mcap_writer.hpp"
+#include "core/log/mcap/ros_schemas.hpp"
 #include "core/log/raw/raw_flight.hpp"
 #include "core/log/raw/raw_log.hpp"
 
@@ -73,6 +74,22 @@ class McapFile : public testing::Test {
   std::string path_, whole_;
   RawLog log_;
 };
+
+// Each part of a schema begins with a type that a message before it names, and it is the same text each time.
+TEST(RosSchema, NamesEachTypeThatItsMembersNeed) {
+  for (const auto* type : {"nav_msgs/Odometry", "nav_msgs/Path", "visualization_msgs/MarkerArray", "tf2_msgs/TFMessage",
+                           "foxglove_msgs/SceneUpdate"}) {
+    const std::string text = ros_schema(type), line = std::string(80, '=') + "\nMSG: ";
+    EXPECT_EQ(text, ros_schema(type));
+    EXPECT_TRUE(std::ranges::all_of(text, [](char c) { return c == '\n' || (c >= ' ' && c <= '~'); })) << type;
+    std::size_t parts = 0;
+    for (auto at = text.find(line); at != text.npos; at = text.find(line, at + 1), ++parts) {
+      const std::string name = text.substr(at + line.size(), text.find('\n', at + line.size()) - at - line.size());
+      EXPECT_NE(text.substr(0, at).find(name), text.npos) << type << " needs no " << name;
+    }
+    EXPECT_GT(parts, 3u) << type;
+  }
+}
 
 TEST_F(McapFile, HoldsTheRawLogByteForByte) {
   const auto log = read(whole_);

@@ -126,7 +126,7 @@ bool is_an_entry(const std::string& line) {
 TEST_P(NoConstant, StandsOutsideTheRoomsRules) {
   std::size_t files = 0;
   for (const auto& entry :
-       std::filesystem::directory_iterator(BACKWASH_SOURCE_DIR "/core/study/" + std::string(GetParam()))) {
+       std::filesystem::recursive_directory_iterator(BACKWASH_SOURCE_DIR "/core/study/" + std::string(GetParam()))) {
     const std::string name = entry.path().filename();
     if (!(name.ends_with(".cpp") || name.ends_with(".hpp")) || name.ends_with("rules.hpp")) continue;
     ++files;
@@ -161,7 +161,7 @@ std::set<std::string> names() {
 TEST(Effects, EveryFileWithAnEffectHasItsLineInTheTable) {
   const std::regex definition("\\nEffect (\\w+)\\(\\) \\{");
   std::size_t found = 0;
-  for (const auto& file : std::filesystem::directory_iterator(BACKWASH_SOURCE_DIR "/core/study/effects")) {
+  for (const auto& file : std::filesystem::recursive_directory_iterator(BACKWASH_SOURCE_DIR "/core/study/effects")) {
     if (file.path().extension() != ".cpp") continue;
     const std::string text = text_of(file.path());
     for (std::sregex_iterator at(text.begin(), text.end(), definition), end; at != end; ++at, ++found) {

@@ -128,7 +128,7 @@ TEST(Extension, ThatMakesOtherFlightsLessLikelyIsRefused) {
   found.theta = theta;
   found.p = 0.01;
   found.gain = 5;
-  const auto applied = judge(evidence, {found});
+  const auto applied = judge(evidence, {found}, {""});
   EXPECT_LT(applied[0].nats, 0);
   EXPECT_NE(applied[0].refused, "");
   StudyResult result;

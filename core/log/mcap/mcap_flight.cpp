@@ -163,6 +163,7 @@ void McapFlight::take_offer(const RawRecord& record) {
   const auto* id = payload<double>(record);  // the first of its numbers
   if (!id || !(*id > 0 && *id < 9e15)) return;
   offers_[static_cast<std::uint64_t>(*id)] = record.bytes;
+  if (offers_.size() > kOffers) offers_.erase(offers_.begin());  // refused ones, of a daemon that flies none of them
   show_trajectory();  // it may stand behind the ticks that fly it: it came by another thread
 }
 

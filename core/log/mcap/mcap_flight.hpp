@@ -73,6 +73,7 @@ class McapFlight {
   std::optional<std::pair<std::size_t, std::size_t>> mode_;  ///< and its reason
   std::uint64_t segment_ = 0;                                ///< that is flown
   bool shown_ = true;                                        ///< it was, or it is none
+  static constexpr std::size_t kOffers = 8;                  ///< kept until one is flown
   std::map<std::uint64_t, Bytes> offers_;                    ///< by segment: that and those after it
   std::optional<RawRecord> map_;                             ///< accepted, not drawn yet
   std::int64_t drawn_ns_ = std::numeric_limits<std::int64_t>::min() / 2;

@@ -108,7 +108,7 @@ void add_needed(std::string_view members, std::vector<std::string_view>& needed)
 std::string ros_schema(std::string_view type) {
   std::string text(definition(type).members);
   std::vector<std::string_view> needed;
-  add_needed(text, needed);
+  add_needed(definition(type).members, needed);  // views of the table, not of what grows
   for (const auto& other : needed)
     text.append(80, '=').append("\nMSG: ").append(other).append("\n").append(definition(other).members);
   return text;

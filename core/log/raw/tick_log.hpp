@@ -55,11 +55,13 @@ struct Replay {
   std::uint64_t ticks_missing = 0;  ///< numbers that the log skips: records that the daemon could not write
   std::uint64_t state_hash = 0;     ///< FNV-1a over all replayed decisions: equal for equal replays
   std::optional<Difference> first;
+  std::string stopped;  ///< why the last ticks of a log that ends in flight are not replayed; empty: all are
 };
 
 /// Runs the logged inputs through track::FlightTick again and compares every decision bit for bit. Errors: bad_data
 /// with the byte offset: a part of a log that is not its first, no constants, an input without its tick, an offered
-/// segment that is not in the log.
+/// segment that is not in the log. Offers come by another ring than ticks: what the last second offers may lie beyond
+/// the end of a log that a kill ended, and then ends the replay.
 tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name);
 
 }  // namespace backwash::log

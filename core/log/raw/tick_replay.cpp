@@ -134,6 +134,15 @@ tl::expected<Segments, LogError> segments_of(const RawLog& log, const std::strin
   return segments;
 }
 
+/// Whether a segment that this tick offers, and that is not in the log, may lie beyond its end: newer than all that are
+/// there, and not more than a second of ticks follows.
+bool ends_before(const RawLog& log, const RawRecord& tick, const Segments& segments, std::uint64_t offered) {
+  if (!segments.empty() && offered <= segments.rbegin()->first) return false;
+  const auto left = std::count_if(log.records.begin() + (&tick - log.records.data()), log.records.end(),
+                                  [](const RawRecord& r) { return r.header.kind == RecordKind::tick; });
+  return static_cast<double>(left) * kControlPeriod <= 1;
+}
+
 /// The tick as the daemon started it.
 tl::expected<track::FlightTick, LogError> tick_of(const RawLog& log, const std::string& name) {
   const auto first = constants_of(log, name);
@@ -238,8 +247,11 @@ tl::expected<Replay, LogError> replay(const RawLog& log, const std::string& name
     const track::AcceptedSegment* segment = nullptr;
     if (input->segment != 0) {
       const auto found = segments->find(input->segment);
-      // Offers come by another ring than ticks, so of a log that is cut short the last ones may lie beyond the cut.
-      if (found == segments->end() && log.cut_at) break;
+      if (found == segments->end() && ends_before(log, record, *segments, input->segment)) {
+        result.stopped = "from tick " + std::to_string(logged->tick) + " on segment " + std::to_string(input->segment) +
+                         " is offered, which lies beyond the end of the log";
+        break;
+      }
       if (found == segments->end())
         return bad(at(name, record) + "offers segment " + std::to_string(input->segment) + ", which is not in the log");
       segment = found->second.get();

@@ -52,9 +52,14 @@ World on_map(World world, map::OccupancyGrid grid, const map::VoxelBox& changed)
   return world;
 }
 
+bool whole(const map::VoxelBox& box, const map::OccupancyGrid& grid) {
+  const map::VoxelBox all = map::all_of(grid.size());
+  return box.low == all.low && box.high == all.high;
+}
+
 /// Where Σ, or what an extension adds, can change, and where the vehicle's centre gets places or loses them.
 map::VoxelBox columns_reached(const World& world, const map::VoxelBox& changed) {
-  if (changed.empty()) return {};
+  if (changed.empty() || whole(changed, world.grid)) return changed;
   map::VoxelBox columns = field::affected_columns(world.grid, world.model, changed);
   const field::Extension& air = world.bounds.extension();
   // A wide body's centre gets places, or loses them, beyond the field's range.
@@ -72,8 +77,8 @@ reach::FillVariance variance_in(const World& world, const map::OccupancyGrid& wh
   return [&, columns, voxels](const auto& store) {
     const Index3 low = ((world.grid.origin() - whole.origin()) / whole.resolution()).array().round().cast<int>();
     std::vector<std::size_t> of_whole;
-    of_whole.reserve(voxels.size());
-    for (const std::size_t n : voxels) of_whole.push_back(whole.linear(world.grid.voxel(n) + low));
+    if (&whole != &world.grid)
+      for (const std::size_t n : voxels) of_whole.push_back(whole.linear(world.grid.voxel(n) + low));
     const field::Extension& air = world.bounds.extension();
     const auto take = [&](const Index3& of, const Variance& s) {
       const Index3 v = of - low;
@@ -81,7 +86,8 @@ reach::FillVariance variance_in(const World& world, const map::OccupancyGrid& wh
       const auto single = [factor](double of_s) { return factor * static_cast<float>(of_s); };
       store(world.grid.linear(v), Variance{single(s.xx), single(s.xy), 0, single(s.yy), 0, single(s.zz)});
     };
-    field::evaluate_columns(whole, world.model, {low + columns.low, low + columns.high}, of_whole, take, parallel);
+    const std::span<const std::size_t> at = &whole == &world.grid ? voxels : std::span<const std::size_t>(of_whole);
+    field::evaluate_columns(whole, world.model, {low + columns.low, low + columns.high}, at, take, parallel);
   };
 }
 
@@ -173,12 +179,19 @@ World with_hover(World world, const map::VoxelBox& box, bool safe_alone, const P
     });
   };
   const auto safe = safe_alone ? voxels_where(world.hover.safe_voxels()) : std::vector<std::size_t>{};
-  world.hover.clear(box);
+  const bool anew = whole(box, world.grid);
+  if (anew)
+    world.hover = reach::HoverMap(world.grid);
+  else
+    world.hover.clear(box);
   if (safe_alone)
     find(safe);
   else
     for (const map::VoxelBox& piece : pieces(box)) find(listed(world, piece));
-  world.safe.update(world.hover.safe_voxels(), box);
+  if (anew)
+    world.safe = SafeSpace(world.hover.safe_voxels());
+  else
+    world.safe.update(world.hover.safe_voxels(), box);
   return world;
 }
 
@@ -189,6 +202,7 @@ std::shared_ptr<const World> restored(World world, std::string_view kept, const 
   const map::VoxelBox all = map::all_of(world.grid.size());
   const auto voxels = listed(world, all);
   if (kept.size() != voxels.size() * kKeptBytes) return nullptr;
+  world.hover = reach::HoverMap(world.grid);
   std::vector<reach::BoundCodes> codes(voxels.size());
   for (std::size_t n = 0; n < voxels.size(); ++n) {
     std::memcpy(codes[n].data(), kept.data() + n * kKeptBytes, sizeof(reach::BoundCodes));
@@ -196,7 +210,7 @@ std::shared_ptr<const World> restored(World world, std::string_view kept, const 
   }
   if (world.bounds.extension().by_place()) world.bounds.extend(world.grid, voxels, parallel);
   world.bounds.restore(voxels, codes, parallel);
-  world.safe.update(world.hover.safe_voxels(), all);
+  world.safe = SafeSpace(world.hover.safe_voxels());
   return std::make_shared<const World>(std::move(world));
 }
 
@@ -231,8 +245,9 @@ World unbuilt_world(map::OccupancyGrid grid, const Model& model, const Vehicle& 
   map::DistanceField distance(grid);
   map::OccupancySums sums(grid);
   reach::BoundField bounds(grid, model.bound, field::Extension(grid, of_vehicle));
-  reach::HoverMap hover(grid);
-  SafeSpace safe(hover.safe_voxels());
+  const map::OccupancyGrid none(grid.origin(), grid.resolution(), Index3::Ones(), map::Cell::unknown);
+  reach::HoverMap hover(none);  // made when the bounds are, which need room themselves
+  SafeSpace safe(none);
   reach::Reachability reach = sets_of(vehicle, method);
   CentreResponse response(vehicle, reach.loop);
   return {std::move(of_vehicle), std::move(grid), std::move(distance), std::move(sums),     std::move(bounds),

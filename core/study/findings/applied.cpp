@@ -167,8 +167,10 @@ std::string why_refused(const Applied& a) {
 
 }  // namespace
 
-std::vector<Applied> judge(const Evidence& evidence, const std::vector<Accepted>& accepted) {
+std::vector<Applied> judge(const Evidence& evidence, const std::vector<Accepted>& accepted,
+                           const std::vector<std::string>& refused) {
   std::vector<Applied> all(accepted.size());
+  for (std::size_t i = 0; i < accepted.size(); ++i) all[i].refused = refused[i];
   for (std::size_t i = 0; i < accepted.size(); ++i) all[i].beside = judged(evidence, accepted, all, i).beside;
   for (;;) {
     std::size_t worst = accepted.size();
@@ -178,9 +180,15 @@ std::vector<Applied> judge(const Evidence& evidence, const std::vector<Accepted>
       if (all[i].refused.empty() && why_refused(all[i]).empty()) continue;
       if (worst == accepted.size() || all[i].nats < all[worst].nats) worst = i;
     }
-    if (worst == accepted.size()) return all;
+    if (worst == accepted.size()) break;
     if (all[worst].refused.empty()) all[worst].refused = why_refused(all[worst]);
   }
+  for (std::size_t i = 0; i < accepted.size(); ++i) {  // what they were worth beside the others
+    if (refused[i].empty()) continue;
+    all[i] = judged(evidence, accepted, all, i);
+    all[i].refused = refused[i];
+  }
+  return all;
 }
 
 }  // namespace backwash::study

@@ -21,7 +21,8 @@ struct Applied {
 
 /// One for each accepted cause. Refused is, the worst first and the others judged anew without it, a cause with which
 /// flights that were not fitted are less likely, or of whose samples fewer lie in the central 90 % interval, fewer than
-/// 90 % that is.
-std::vector<Applied> judge(const Evidence& evidence, const std::vector<Accepted>& accepted);
+/// 90 % that is. `refused`: why each is refused before that, and the others judged without it; empty: none is.
+std::vector<Applied> judge(const Evidence& evidence, const std::vector<Accepted>& accepted,
+                           const std::vector<std::string>& refused);
 
 }  // namespace backwash::study

@@ -85,8 +85,9 @@ std::string rotor_section(const RotorVerdict& v, report::PageData& data) {
     bars.runs.push_back({{at, 100 * e.low}, {at, 100 * e.high}});
   }
   data.tables.push_back(std::move(table));
-  const auto level = [](double y) { return report::Run{{0.5, y}, {4.5, y}}; };
-  const report::Chart chart{.x = {"", 0.5, 4.5, false, {"rotor 1", "rotor 2", "rotor 3", "rotor 4"}},
+  const double first = 0.5, last = first + static_cast<double>(v.each.size());  // half a rotor beside the outer ones
+  const auto level = [first, last](double y) { return report::Run{{first, y}, {last, y}}; };
+  const report::Chart chart{.x = {"", first, last, false, {"rotor 1", "rotor 2", "rotor 3", "rotor 4"}},
                             .y = {"command needed more, %"},
                             .layers = {{line, measured, "", {level(0)}},
                                        {line, commanded, "named four times in five", {level(100 * v.minimum)}},

@@ -156,7 +156,15 @@ std::vector<UnknownStructure> with_dependence(std::vector<UnknownStructure> unkn
 /// Gain, worth as applied and hover shift of what acts in all flights.
 std::vector<NamedCause> in_all_flights(const Evidence& evidence, const std::vector<Accepted>& accepted) {
   std::vector<NamedCause> causes;
-  const auto applied = judge(evidence, accepted);
+  std::vector<std::string> unwritable(accepted.size());
+  auto applied = judge(evidence, accepted, unwritable);
+  for (std::size_t i = 0; i < accepted.size(); ++i) {
+    const NamedCause cause{accepted[i], {}, {}, applied[i]};
+    if (!applied[i].refused.empty()) continue;
+    if (const auto why = why_unwritable(cause, evidence.seen())) unwritable[i] = "no model file holds it: " + *why;
+  }
+  if (std::ranges::any_of(unwritable, [](auto& why) { return !why.empty(); }))
+    applied = judge(evidence, accepted, unwritable);
   for (std::size_t i = 0; i < accepted.size(); ++i) {
     NamedCause cause{accepted[i],
                      gain_of(evidence, accepted, i),
@@ -166,8 +174,6 @@ std::vector<NamedCause> in_all_flights(const Evidence& evidence, const std::vect
                      largest_flown(accepted[i], evidence.seen()),
                      check_shift(accepted[i], applied[i].beside, evidence.seen())};
     if (cause.found.form->anchor) cause.found.scale.anchor = cause.found.form->anchor(evidence.seen().windows);
-    const auto why = cause.applied.refused.empty() ? why_unwritable(cause, evidence.seen()) : std::nullopt;
-    if (why) cause.applied.refused = "no model file holds it: " + *why;
     causes.push_back(std::move(cause));
   }
   return causes;

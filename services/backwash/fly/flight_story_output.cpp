@@ -32,7 +32,7 @@ Json to_json(const tl::expected<log::Replay, log::LogError>& replay) {
   return {{"ticks", counted.ticks},
           {"differing_ticks", counted.differing},
           {"ticks_missing", counted.ticks_missing},
-          {"why_not", replay ? "" : replay.error().message}};
+          {"why_not", replay ? replay->stopped : replay.error().message}};
 }
 
 /// Nothing of a flight that one map judged whole.

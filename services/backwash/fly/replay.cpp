@@ -30,7 +30,8 @@ Json to_json(const log::Replay& r, bool equal) {
                {"segments", r.segments},
                {"setpoints", r.setpoints},
                {"differing_ticks", r.differing},
-               {"decisions_hash", hex(r.state_hash)}};
+               {"decisions_hash", hex(r.state_hash)},
+               {"stopped", r.stopped}};
   if (r.first)
     json["first_difference"] = {{"tick", r.first->tick},
                                 {"byte", r.first->offset},
@@ -57,6 +58,7 @@ int run(const ReplayOptions& options) {
               r.setpoints, r.segments, hex(r.state_hash).c_str());
   if (log.cut_at)
     std::printf("the last record is cut short at byte %" PRIu64 ": replayed up to the tick before it\n", *log.cut_at);
+  if (!r.stopped.empty()) std::printf("%s: replayed up to the tick before it\n", r.stopped.c_str());
   if (r.ticks_missing > 0) std::printf("%" PRIu64 " ticks are missing from the log\n", r.ticks_missing);
   if (r.first)
     std::printf(

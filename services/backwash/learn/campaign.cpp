@@ -79,12 +79,25 @@ class Made {
   Json of(const Words& words) {
     Json made{{"command", words}, {"program", nullptr}, {"inputs", Json::object()}};
     if (words.front() == "backwash") made["program"] = {{"version", kVersion}, {"sha256", hash(own_program())}};
-    for (const auto& word : words)
-      if (std::error_code unknown; std::filesystem::is_regular_file(word, unknown)) made["inputs"][word] = hash(word);
+    const std::string research = own_program() + "-" + (words.size() > 1 ? words[1] : "");
+    if (words.front() == "backwash") add(research, made["inputs"]);  // a verb that is a program of its own
+    for (const auto& word : words) {
+      const auto value = word.starts_with("-") ? word.find('=') : std::string::npos;
+      add(value == std::string::npos ? word : word.substr(value + 1), made["inputs"]);
+    }
     return made;
   }
 
  private:
+  /// A file, or every file of a folder. Words that are neither are no inputs.
+  void add(const std::string& path, Json& inputs) {
+    namespace fs = std::filesystem;
+    std::error_code unknown;
+    if (fs::is_regular_file(path, unknown)) inputs[path] = hash(path);
+    if (!fs::is_directory(path, unknown)) return;
+    for (fs::recursive_directory_iterator at(path, unknown), end; !unknown && at != end; at.increment(unknown))
+      if (std::error_code odd; at->is_regular_file(odd)) inputs[at->path()] = hash(at->path());
+  }
   std::string hash(const std::string& path) {
     auto& known = hashes_[path];
     if (known.empty()) known = sha256_of_file(path);

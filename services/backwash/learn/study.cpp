@@ -131,7 +131,7 @@ void write_model(const StudyOptions& options, const Model& model, const study::S
                  const study::Observations& seen) {
   const auto text =
       study::extended_model_text(model, result, seen, options.model, kVersion, earlier_terms(options.model));
-  write_file(options.out, text, options.force);
+  write_model_file(options.out, text, options.force);
 }
 
 std::optional<study::Consequence> what_it_costs(const study::StudyResult& result, const study::Observations& seen,

@@ -223,6 +223,22 @@ TEST(WallClockFault, AStepOfTheViosByAnHourChangesNothing) {
 
 // What was flown on until an attack found it (docs/faults.md rows 4 and 6).
 
+TEST(VioFreezeFault, IdenticalPosesOnTheGroundAreNoFault) {
+  Lockstep rig;
+  rig.ticks(50);
+  std::optional<OdometrySample> frozen;
+  rig.spoil = [&](OdometrySample& s) {
+    if (!frozen) frozen = s;
+    s.state = frozen->state;
+    s.q = frozen->q;
+  };
+  rig.ticks(25);
+  EXPECT_TRUE(rig.channels->orders.push({track::Request::enable}));
+  EXPECT_GT(rig.ticks_until(Mode::tracking, 250), 0) << to_string(rig.reason());
+  rig.ticks(25);
+  EXPECT_EQ(rig.mode(), Mode::tracking) << to_string(rig.reason());
+}
+
 // Fresh stamps, the same pose to the last bit: the autopilot believes it and drifts, 0.6 m in 5 s and 25 m in a minute.
 // Nothing compares identical poses unless a velocity is commanded.
 TEST(VioFreezeFault, AVioThatFreezesInAHoverIsHeldBeforeTheVehicleHasDriftedAway) {

@@ -94,7 +94,7 @@ async function worked(browser) {
       const near = await area(chart);
       await tab.mouse.dblclick(box.x + 0.4 * box.width, box.y + 0.3 * box.height);
       const scale = (text) => text ? +text.match(/scale\(([0-9.e+-]+)/)[1] : 1;
-      said.dragged = said.dragged && scale(near) > 1.5 * scale(before) && Math.abs(scale(await area(chart)) - 1) < 1e-9;
+      said.dragged = said.dragged && scale(near) > 1.5 * scale(before) && Math.abs(scale(await area(chart)) - scale(before)) < 1e-9;
     }
   }
   for (const button of await tab.$$("button[data-table]")) {
