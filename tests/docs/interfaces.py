@@ -26,7 +26,8 @@ PLAIN = ("OctoMap file or builtin:NAME", "model file or builtin:NAME", "vehicle 
 
 def options(help_text: str) -> dict[str, str]:
     """Arguments and options of a --help: name with its values and default, and what it is. Those of one meaning stand together."""
-    text = re.sub(r"\n {20,}(?=\S)", "  ", help_text).split("Subcommands:")[0].split("\nExample")[0]  # a name may be too long for its column
+    text = re.sub(r"\n {20,}(?=\S)", "  ", help_text).split("Subcommands:")[0]  # a name may be too long for its column
+    text = re.sub(r"(?s)(Options:.*?)\nExample.*", r"\1", text)
     text = re.sub(r"=\[([^]]*)\] \.\.\.(?: (?=\S))?", r"=\1  ", text)  # of several values
     told: dict[str, str] = {}
     for name, spec, meaning in re.findall(r"^  ((?:-\w,)?-{0,2}[\w-]+)(?: (\S.*?))?(?: {2,}(.*))?$", text, re.M):
