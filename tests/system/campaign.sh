@@ -75,6 +75,17 @@ assert "track.csv" in json.loads(head)["made"]["inputs"] and row + "\n" == say(*
 hash_of = json.loads(head)["made"]["program"]["sha256"]
 pathlib.Path("own/line-1.jsonl").write_text(head.replace(hash_of, hash_of[::-1]) + "\n" + row + "\n")
 assert "was made with another program" in say("campaign", "merge", "own.txt", "-o", "own", code=65)
+# Inputs are files behind --key= too, and those in a folder, which may come later.
+os.makedirs("rooms/deeper")
+for path, later in (("key", "key"), ("rooms/one", "rooms/one"), ("rooms/one", "rooms/two")):
+    shutil.rmtree("inputs", ignore_errors=True)
+    pathlib.Path(path).write_text("1")
+    pathlib.Path("inputs.txt").write_text("./rows.py 1 --map=key\n./rows.py 1 rooms\n")
+    say("campaign", "run", "inputs.txt", "-o", "inputs")
+    pathlib.Path("rooms/deeper/three").write_text(later)
+    say("campaign", "merge", "inputs.txt", "-o", "inputs")
+    pathlib.Path(later).write_text("2")
+    assert f"was made with another {later};" in say("campaign", "merge", "inputs.txt", "-o", "inputs", code=65), later
 
 # A command that fails, prints no rows, is none, or whose input is edited while it runs. The other lines are done.
 pathlib.Path("in.json").write_text('{"v": 1}\n')

@@ -52,14 +52,15 @@ World on_map(World world, map::OccupancyGrid grid, const map::VoxelBox& changed)
   return world;
 }
 
-bool whole(const map::VoxelBox& box, const map::OccupancyGrid& grid) {
+/// Whether a box is all of a grid.
+bool is_all(const map::VoxelBox& box, const map::OccupancyGrid& grid) {
   const map::VoxelBox all = map::all_of(grid.size());
   return box.low == all.low && box.high == all.high;
 }
 
 /// Where Σ, or what an extension adds, can change, and where the vehicle's centre gets places or loses them.
 map::VoxelBox columns_reached(const World& world, const map::VoxelBox& changed) {
-  if (changed.empty() || whole(changed, world.grid)) return changed;
+  if (changed.empty() || is_all(changed, world.grid)) return changed;
   map::VoxelBox columns = field::affected_columns(world.grid, world.model, changed);
   const field::Extension& air = world.bounds.extension();
   // A wide body's centre gets places, or loses them, beyond the field's range.
@@ -179,7 +180,7 @@ World with_hover(World world, const map::VoxelBox& box, bool safe_alone, const P
     });
   };
   const auto safe = safe_alone ? voxels_where(world.hover.safe_voxels()) : std::vector<std::size_t>{};
-  const bool anew = whole(box, world.grid);
+  const bool anew = is_all(box, world.grid);
   if (anew)
     world.hover = reach::HoverMap(world.grid);
   else

@@ -11,7 +11,7 @@
 
 #include "core/types/geometry.hpp"
 
-/// The one kit that draws: charts as SVG, which the page's script can zoom into and put a cursor on (charts.js).
+/// The one kit that draws: charts as SVG, which the page's script can zoom into and put a cursor on (plots.js).
 namespace backwash::report {
 
 using Place = Eigen::Vector2d;  ///< along both axes of a chart, in their units

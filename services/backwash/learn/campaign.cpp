@@ -89,13 +89,14 @@ class Made {
   }
 
  private:
-  /// A file, or every file of a folder. Words that are neither are no inputs.
+  /// A file, or the files that lie in a folder, without those in folders of its own. Words that are neither are no
+  /// inputs.
   void add(const std::string& path, Json& inputs) {
     namespace fs = std::filesystem;
     std::error_code unknown;
     if (fs::is_regular_file(path, unknown)) inputs[path] = hash(path);
     if (!fs::is_directory(path, unknown)) return;
-    for (fs::recursive_directory_iterator at(path, unknown), end; !unknown && at != end; at.increment(unknown))
+    for (fs::directory_iterator at(path, unknown), end; !unknown && at != end; at.increment(unknown))
       if (std::error_code odd; at->is_regular_file(odd)) inputs[at->path()] = hash(at->path());
   }
   std::string hash(const std::string& path) {
