@@ -41,7 +41,8 @@ for how in "${hows[@]}"; do
   begun=$EPOCHREALTIME
   status
   joined=$EPOCHREALTIME
-  wait "${more_pids[-1]}"
+  for _ in $(seq 600); do [[ $(wc -l <"$work/took") -lt 2 ]] || break; sleep 0.1; done
+  kill "${more_pids[-1]}"
   during=$(resident)
   status
   python3 - "$mode $how" "$work/took" "$before" "$during" "$begun" "$joined" "$(value state)" "$(value ticks_missed)" "$missed" "$(value parts_filtered)" <<'PYTHON' || die "$mode, $how"

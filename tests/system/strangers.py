@@ -10,10 +10,12 @@ strangers.py DOMAIN COUNT RATE SOCKETS [again|dependent|endpoints|forwarded|disp
   endpoints    of one participant, and then COUNT writers of it, of parts of maps
   forwarded    COUNT announcements by one participant of others
   dispose      that PARTICIPANT is gone, as the liveliness topic of another says it
-Prints a line when it begins, and the seconds that it took.
+Prints a line when it begins, and the seconds that it took. It keeps its ports until it is killed: whoever got one of them would be
+taken for it.
 """
 import os
 import random
+import signal
 import socket
 import struct
 import sys
@@ -109,7 +111,8 @@ def main() -> int:
             time.sleep(0.5)
         if rate and (ahead := begun + number / rate - time.monotonic()) > 0.001:
             time.sleep(ahead)
-    print(f"{time.monotonic() - begun:.1f}")
+    print(f"{time.monotonic() - begun:.1f}", flush=True)
+    signal.pause()
     return 0
 
 
