@@ -122,7 +122,7 @@ double acts_since(const Request& request, int flight) {
   const auto& in = request.in_flights;
   if (in.empty()) return 0;
   if (std::find(in.begin(), in.end(), flight) == in.end()) return std::numeric_limits<double>::infinity();
-  return flight == *std::min_element(in.begin(), in.end()) ? request.since_s : 0;
+  return request.in_each || flight == *std::min_element(in.begin(), in.end()) ? request.since_s : 0;
 }
 
 backwash::map::OccupancyGrid true_grid(const Room& room) {

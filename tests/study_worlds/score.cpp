@@ -6,7 +6,7 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
-#include "core/study/findings/where_it_acts.hpp"
+#include "core/study/findings/when_it_acts.hpp"
 #include "tests/study_worlds/observe.hpp"
 #include "tests/study_worlds/oracle.hpp"
 

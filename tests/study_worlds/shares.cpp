@@ -10,7 +10,7 @@
 #include <sstream>
 #include <tuple>
 
-#include "core/study/findings/where_it_acts.hpp"
+#include "core/study/findings/when_it_acts.hpp"
 #include "tests/study_worlds/effects.hpp"
 #include "tests/study_worlds/observe.hpp"
 #include "tests/study_worlds/summary.hpp"
@@ -27,7 +27,9 @@ std::vector<int> drawn_flights(const SharedFault& hidden, std::mt19937_64& rng) 
     std::shuffle(all.begin(), all.end(), rng);
   } else {
     const int last = kFlights - hidden.count;
-    const int first = hidden.layout == "since" ? last : std::uniform_int_distribution(0, last)(rng);
+    const int first = hidden.layout == "since" || hidden.layout == "from" || hidden.layout == "each"
+                          ? last
+                          : std::uniform_int_distribution(0, last)(rng);
     std::rotate(all.begin(), all.begin() + first, all.end());
   }
   all.resize(static_cast<std::size_t>(hidden.count));
@@ -53,9 +55,10 @@ SharedOutcome score(const SharedFault& hidden, std::uint64_t seed, const std::fi
   out.hidden = hidden;
   out.seed = seed;
   out.truth = drawn_flights(hidden, rng);
-  if (hidden.layout == "since") out.since_s = std::uniform_real_distribution(20.0, 60.0)(rng);
+  const bool each = hidden.layout == "each";
+  if (hidden.layout == "since" || each) out.since_s = std::uniform_real_distribution(20.0, 60.0)(rng);
   const bool rpm = hidden.fault == "rpm";
-  Request request{seed, {}, hidden.size, kFlights, "", out.truth, out.since_s};
+  Request request{seed, {}, hidden.size, kFlights, "", out.truth, out.since_s, each};
   if (!rpm) request.causes = {hidden.fault};
   const HiddenWorld world = draw_world(request);
   auto flights = fly_all(world);
@@ -108,8 +111,7 @@ std::string shares_table(const std::vector<SharedOutcome>& outcomes) {
     row.exact.count(o.exact());
     row.rotor.count(o.found && o.rotor);
     row.wrong.count(o.wrong);
-    if (o.found && o.hidden.layout == "since" && o.told_since_s >= 0)
-      row.late.push_back(std::abs(o.told_since_s - o.since_s));
+    if (o.found && o.since_s > 0 && o.told_since_s >= 0) row.late.push_back(std::abs(o.told_since_s - o.since_s));
   }
   std::ostringstream text;
   text << "| hidden | size | flights | told, and in some flights | exactly these flights | right rotor | wrong name | "

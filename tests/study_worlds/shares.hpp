@@ -12,7 +12,8 @@ namespace study_worlds {
 struct SharedFault {
   std::string fault;   ///< a cause of the generator; "rpm": a rotor's rpm reads 0.54 of what it is
   int count = 4;       ///< of 12 flights
-  std::string layout;  ///< "run": behind each other; "any": any of them; "since": to the last, from within the first
+  std::string layout;  ///< "run": behind each other; "any": any of them; "from": to the last; "since": from
+                       ///< within the first of them; "each": from a moment on in each of all twelve
   double size = 1;     ///< in units of the effect-size table
 };
 

@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
   app.add_option("--worlds", worlds, "per row").capture_default_str();
   app.add_option("--jobs", jobs).capture_default_str();
   app.add_option("--fault", faults, "causes of the generator, or rpm");
-  app.add_option("--layout", layouts).check(backwash::services::one_of({"run", "any", "since"}));
+  app.add_option("--layout", layouts).check(backwash::services::one_of({"run", "any", "from", "since", "each"}));
   app.add_option("--count", counts, "flights of 12");
   app.add_option("--size", size, "in units of the effect-size table").capture_default_str();
   app.add_option("--out", out, "JSON lines, appended to");
@@ -51,7 +51,8 @@ int main(int argc, char** argv) {
   std::vector<SharedFault> trials;
   for (const auto& fault : faults)
     for (const auto& layout : layouts)
-      for (const int count : counts) trials.push_back({fault, count, layout, size});
+      for (const int count : layout == "each" ? std::vector{12} : counts)
+        trials.push_back({fault, count, layout, size});
   const std::string table = shares_table(run(trials, seed, worlds, jobs, lines));
   std::printf("seed %llu, %d worlds a row\n\n%s", static_cast<unsigned long long>(seed), worlds, table.c_str());
   return 0;

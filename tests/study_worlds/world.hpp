@@ -31,6 +31,7 @@ struct Request {
   std::string confound;
   std::vector<int> in_flights = {};  ///< in which the causes act, from 0; empty: all
   double since_s = 0;                ///< in the first of these they begin so late
+  bool in_each = false;              ///< in each of them
   double rough_walls = 1;            ///< factor on the variance within 0.7 m of a side wall, in every flight
 };
 

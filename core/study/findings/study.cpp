@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/study/findings/extend.hpp"
-#include "core/study/findings/where_it_acts.hpp"
+#include "core/study/findings/when_it_acts.hpp"
 #include "core/study/findings/words.hpp"
 #include "core/study/inference/coverage.hpp"
 #include "core/study/inference/estimate.hpp"
@@ -231,7 +231,7 @@ std::optional<Doubt> doubted_drift(const NamedCause& cause, const Observations& 
 std::vector<NamedCause> causes_of(const WholeSearch& whole, const Evidence& evidence, const Observations& seen,
                                   std::optional<double> unjudged, const std::optional<SoundRotors>& sound) {
   std::vector<NamedCause> causes = in_all_flights(evidence, whole.found.accepted);
-  for (const auto& cause : whole.some) causes.push_back(named(cause, evidence));
+  for (const auto& cause : whole.changes) causes.push_back(named(cause, evidence));
   const double between_craft = sound ? sound->spread : kRotorRules.rotor_spread.value;
   for (auto& cause : causes) {
     const bool some = !cause.flights.empty();  // against the craft's own other flights
@@ -271,7 +271,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   SettledRotors settled = settle_rotors(options.sound, seen);
   const WholeSearch whole = search_all(std::move(settled.seen), options.search);
   const CauseSearchResult& found = whole.found;
-  Evidence evidence(whole.rest);
+  Evidence evidence = whole.evidence();
   evidence.whiten(columns_of(found.accepted, whole.rest));
   const auto causes = causes_of(whole, evidence, seen, settled.unjudged, options.sound);
   const bool silent = causes.empty() && found.unknown.empty() && options.search.known.empty();

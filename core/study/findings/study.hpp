@@ -39,6 +39,7 @@ struct NamedCause {
   double largest_flown = 0;                ///< m/s² or ln: what the cause added at most, of its first channel
   ShiftCheck shift = {};                   ///< whether the craft hovers where its push would hold it
   std::vector<ActingFlight> flights = {};  ///< in which it acts; empty: all
+  std::string when = {};                   ///< of a change (when_it_acts.hpp)
 };
 
 struct StudyOptions {

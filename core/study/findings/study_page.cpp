@@ -11,7 +11,7 @@
 #include "core/report/page/page.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/self_test.hpp"
-#include "core/study/findings/where_it_acts.hpp"
+#include "core/study/findings/when_it_acts.hpp"
 #include "core/study/findings/words.hpp"
 #include "core/study/inference/rules.hpp"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/study/findings/page_sections.hpp"
-#include "core/study/findings/where_it_acts.hpp"
+#include "core/study/findings/when_it_acts.hpp"
 #include "core/study/inference/rules.hpp"
 
 namespace backwash::study {

@@ -150,10 +150,10 @@ std::vector<Eigen::MatrixXd> Evidence::grams(const std::vector<const DesignColum
 NormalEquations Evidence::normal(const std::vector<DesignColumn>& columns,
                                  const std::vector<DesignColumn>& nuisance) const {
   std::vector<const DesignColumn*> joint;
-  joint.reserve(nuisance.size() + columns.size());
-  for (const auto& c : nuisance) joint.push_back(&c);
-  for (const auto& c : columns) joint.push_back(&c);
-  return normal_equations(grams(joint), nuisance.size(), columns.size());
+  joint.reserve(free_.size() + nuisance.size() + columns.size());
+  for (const auto* some : {&free_, &nuisance, &columns})
+    for (const auto& c : *some) joint.push_back(&c);
+  return normal_equations(grams(joint), free_.size() + nuisance.size(), columns.size());
 }
 
 SmallMatrix Evidence::size(const std::vector<DesignColumn>& columns) const {
@@ -248,8 +248,10 @@ void Evidence::weigh_means(const std::vector<double>& ln_variance) {
 }
 
 /// y (decorrelated) less what the columns explain of it, by weighted least squares over all flights.
-DesignColumn Evidence::residual(const std::vector<DesignColumn>& columns) const {
+DesignColumn Evidence::residual(const std::vector<DesignColumn>& fitted) const {
   DesignColumn residual = y_;
+  std::vector<DesignColumn> columns = free_;
+  columns.insert(columns.end(), fitted.begin(), fitted.end());
   if (columns.empty()) return residual;
   std::vector<const DesignColumn*> pointers;
   pointers.reserve(columns.size());
@@ -283,6 +285,48 @@ void Evidence::whiten(const std::vector<DesignColumn>& accepted) {
     }
   std::ranges::for_each(rest.parts, scatter_of);
   if (!tilts_.empty()) tilt_ = trim_scatter(rest);
+}
+
+std::vector<double> Evidence::ln_likelihood(const std::vector<DesignColumn>& accepted) const {
+  DesignColumn every;
+  for (std::size_t c = kMeanX; c <= kVarZ; ++c) every.parts.push_back({static_cast<Channel>(c), {}});
+  std::vector<DesignColumn> columns = offsets({every}, *seen_);
+  columns.insert(columns.end(), accepted.begin(), accepted.end());
+  std::vector<DesignColumn> rest{residual(columns)};
+  if (tilt_ > 0) rest.insert(rest.begin(), tilts_.begin(), tilts_.end());
+  rest.push_back(rest.back());
+  const auto z = static_cast<Eigen::Index>(rest.size()) - 2;
+  std::vector<Eigen::MatrixXd> grams(seen_->units.size(), Eigen::MatrixXd::Zero(z + 2, z + 2));
+  std::vector<double> nats(grams.size(), 0);
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    add_channel(grams, static_cast<Channel>(c), rest);
+    for (std::size_t f = 0; f < nats.size(); ++f) {
+      double units = 0;
+      for (std::size_t i = seen_->units.first[f]; i < seen_->units.first[f + 1];) {
+        double weight = 0;
+        for (const std::size_t end = flight_end_[i]; i < end; ++i) {
+          const double w = weight_[c][i] / scatter_[c].within;
+          if (w > 0) nats[f] += std::log(w) / 2;
+          weight += w;
+        }
+        const double own = 1 + scatter_[c].between * weight;
+        nats[f] -= std::log(own) / 2;
+        units += weight / own;
+      }
+      nats[f] -= std::log1p(scatter_[c].units * units) / 2;
+    }
+  }
+  for (std::size_t f = 0; f < nats.size(); ++f) {
+    double square = grams[f](z, z);
+    if (z > 0) {  // Woodbury, as in grams()
+      const Eigen::Matrix2d own = grams[f].topLeftCorner<2, 2>() + Eigen::Matrix2d::Identity() / tilt_;
+      const Eigen::Vector2d cross = grams[f].block<2, 1>(0, z);
+      square -= cross.dot(own.ldlt().solve(cross));
+      nats[f] -= std::log((own * tilt_).determinant()) / 2;
+    }
+    nats[f] -= square / 2;
+  }
+  return nats;
 }
 
 /// Takes each flight's mean out of every channel, and with the level means' its own trim, ridge 1/σ_t².

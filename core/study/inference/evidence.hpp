@@ -26,8 +26,14 @@ class Evidence {
   explicit Evidence(const Observations& seen);
   const Observations& seen() const noexcept { return *seen_; }
 
+  /// Leaves columns free in all that follows, as if they were accepted each time.
+  void leave_free(std::vector<DesignColumn> columns) { free_ = std::move(columns); }
   /// Takes the accepted columns (with the offsets of their channels) out and estimates the scatter of what is left.
   void whiten(const std::vector<DesignColumn>& accepted);
+
+  /// ln likelihood of each unit under the scatter of the last whiten(), `columns` and the offsets of every
+  /// channel fitted to all flights.
+  std::vector<double> ln_likelihood(const std::vector<DesignColumn>& columns) const;
 
   /// A flight that came after these, by itself, weighed with the scatter of these. Keeps a pointer to `flight`.
   Evidence next(const Observations& flight) const;
@@ -60,6 +66,7 @@ class Evidence {
   const Observations* seen_;
   DesignColumn y_;  // every channel, decorrelated
   std::array<std::vector<double>, kChannels> weight_;
+  std::vector<DesignColumn> free_;
   std::vector<DesignColumn> tilts_;      // Z; empty without attitude
   std::vector<std::size_t> flight_end_;  // per window, where its flight ends
   std::array<Scatter, kChannels> scatter_{};

@@ -72,6 +72,7 @@ struct Rules {
   Rule ridge{"ridge", 1e-9, "1", "derived: keeps an inverse finite, changes no digit that is told"};
   // Estimates
   Rule tail{"tail", 0.025, "1", "derived: an interval of 95 % leaves so much beyond each end"};
+  Rule normal_75{"normal_75", normal::k75, "1", "derived: its quantile, by which a median deviation is a standard one"};
   Rule normal_975{"normal_975", normal::k975, "1", "derived: its quantile of the normal distribution"};
   Rule fine_scales{"fine_scales", 12, "scales", "chosen: the likelihood is averaged over so many"};
   Rule beyond_scales{"beyond_scales", 1.5, "1", "chosen: the finer grid goes so far beyond the searched scales"};
@@ -106,14 +107,14 @@ struct Rules {
   // Causes in some flights only
   Rule fewest_divided{"fewest_divided", 6, "flights", "derived: two levels and a scatter about each"};
   Rule fewest_a_side{"fewest_a_side", 2, "flights", "derived: one flight alone has no scatter of its own"};
-  Rule division_kinds{"division_kinds", 3, "1", "derived: from a flight on, a run of them, any set: each pays for all"};
   Rule level_scatter{"level_scatter", 2, "degrees of freedom",
                      "measured: so many taken off, equally spread values pass no more often than normal ones"};
+  Rule change_share{"change_share", 1.0 / 3, "of accept_p",
+                    "chosen: asked beside everything that all flights are asked"};
+  Rule median_degrees{"median_degrees", 0.37, "of a value", "derived: the efficiency of a median deviation"};
+  Rule moment_windows{"moment_windows", 5, "windows", "chosen: moments within each flight are asked every 10 s"};
   Rule most_parts{"most_parts", 3, "causes", "derived: as many further causes as most_causes leaves"};
   Rule side_windows{"side_windows", 4, "windows", "chosen: 8 s on either side of a step within a flight"};
-  Rule likeness_lags{"likeness_lags", 4, "windows", "chosen: neighbours that share a dwell"};
-  Rule step_price{"step_price", 8, "nats", "derived: of one of 45 windows in one of 12 flights, and one parameter"};
-  Rule column_price{"column_price", 3, "nats", "derived: as structure_lead, for each further parameter of a form"};
   Rule sound_first{"sound_first", 1, "nats", "chosen: craft are sound before they are broken"};
   Rule sound_spread{"sound_spread", 0.03, "1", "chosen: farther off, a rotor is not as it was built"};
   // The extension

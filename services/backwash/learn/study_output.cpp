@@ -6,7 +6,7 @@
 #include "core/study/calibrate/calibration_rules.hpp"
 #include "core/study/design/design_rules.hpp"
 #include "core/study/findings/page_sections.hpp"
-#include "core/study/findings/where_it_acts.hpp"
+#include "core/study/findings/when_it_acts.hpp"
 #include "core/study/findings/words.hpp"
 
 namespace backwash::services {
@@ -76,6 +76,7 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
                {"separate_by", separate}};
   if (cause.flights.empty()) return json;
   json["where"] = study::where(cause);
+  json["when"] = cause.when;
   json["in_flights"] = to_json(cause.flights, logs);
   return json;
 }

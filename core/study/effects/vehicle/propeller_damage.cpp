@@ -20,9 +20,9 @@ std::vector<SimulationTerm> needs_more_and_shakes(const FittedForm& fitted, cons
   return terms;
 }
 
-/// A weak rotor takes up to d/4 of the collective thrust with it: no payload.
+/// A weak rotor takes up to d/4 of the collective thrust with it, and shakes the craft: no payload, no rougher air.
 std::vector<DesignColumn> lost_thrust(const Windows& ws) {
-  return {missing_thrust(ws, [](auto&) { return 1.0; })};
+  return {missing_thrust(ws, [](auto&) { return 1.0; }), in_variance(ws, [](auto&) { return 1.0; })};
 }
 
 }  // namespace

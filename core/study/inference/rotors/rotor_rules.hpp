@@ -11,7 +11,6 @@ struct RotorRules {
                     "measured: rotors of a sound craft differ by 5 to 15 % (docs/measurements/recordings.md)"};
   Rule spread_limit{"spread_limit", 2.5, "rotor_spread", "derived: the largest of four rotors passes it in 0.015"};
   Rule shaking_line{"shaking_line", 0.25, "ln power", "derived: as the floor of vibration"};
-  Rule some_level{"some_level", 0.1, "of accept_p", "chosen: asked beside everything that all flights are asked"};
   Rule alike_windows{"alike_windows", 0.1, "of windows",
                      "chosen: two divisions of the flights that differ by less are one"};
   Rule unjudged_loss{"unjudged_loss", 1.5, "of the lost thrust",

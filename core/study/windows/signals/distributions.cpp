@@ -3,6 +3,7 @@
 
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/students_t.hpp>
+#include <boost/math/special_functions/beta.hpp>
 #include <boost/math/special_functions/digamma.hpp>
 #include <boost/math/special_functions/trigamma.hpp>
 
@@ -26,6 +27,10 @@ double student_tail(double t, double degrees) {
 
 double f_quantile(double p, double above, double below) {
   return quantile(boost::math::fisher_f_distribution<double, Policy>(above, below), p);
+}
+
+double r2_tail(double r2, double explained, double left) {
+  return boost::math::ibeta(left / 2, explained / 2, 1 - r2, Policy());
 }
 
 double digamma(double x) { return boost::math::digamma(x, Policy()); }

@@ -10,6 +10,8 @@ double student_quantile(double p, double degrees);
 double student_tail(double t, double degrees);
 /// Quantile p of the F distribution with `above` and `below` degrees of freedom.
 double f_quantile(double p, double above, double below);
+/// P(R² > r2) where `explained` of all degrees of freedom are fitted to noise alone and `left` remain.
+double r2_tail(double r2, double explained, double left);
 /// ψ(x) = d ln Γ(x)/dx, and its derivative ψ'(x).
 double digamma(double x);
 double trigamma(double x);

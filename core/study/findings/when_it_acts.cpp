@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/findings/where_it_acts.hpp"
+#include "core/study/findings/when_it_acts.hpp"
 
 #include <cmath>
 #include <numeric>
@@ -35,9 +35,10 @@ void measure_errors(Gain& gain, const Accepted& cause, const Observations& befor
 
 }  // namespace
 
-NamedCause named(const InSomeFlights& cause, const Evidence& rest) {
+NamedCause named(const Change& cause, const Evidence& rest) {
   NamedCause told{.found = cause.found, .gain = {}, .separate_by = {}, .flights = cause.flights};
-  told.applied.refused = "it acts in some flights only: mend it, or study those flights by themselves";
+  told.when = when(cause.when, cause.flights, rest.seen().flights);
+  told.applied.refused = "it does not act in all flights alike: mend it, or study those flights by themselves";
   const auto before = with(cause.found, rest.seen());
   measure_errors(told.gain, cause.found, before, rest.seen());
   told.gain.coverage_before = coverage(before);
@@ -56,25 +57,40 @@ NamedCause named(const InSomeFlights& cause, const Evidence& rest) {
   return told;
 }
 
-std::string where(const NamedCause& cause) {
-  if (cause.flights.empty()) return "";
-  std::string text;
-  for (const auto& e : cause.found.parameters)
-    if (e.name == "rotor") text = "rotor " + std::to_string(static_cast<int>(e.value)) + ", ";
-  text += cause.flights.size() == 1 ? "flight " : "flights ";
-  for (std::size_t k = 0; k < cause.flights.size();) {
-    std::size_t last = k;
-    while (last + 1 < cause.flights.size() && cause.flights[last + 1].flight == cause.flights[last].flight + 1) ++last;
-    text += (k == 0 ? "" : ", ") + std::to_string(cause.flights[k].flight + 1);
-    if (last > k) text += (last > k + 1 ? "-" : ", ") + std::to_string(cause.flights[last].flight + 1);
-    k = last + 1;
+std::string when(When when, const std::vector<ActingFlight>& acting, std::size_t flights) {
+  if (when == When::growing) return "growing from flight to flight";
+  if (acting.empty()) return "";
+  const auto seconds = [](double s) { return std::to_string(std::lround(s)) + " s"; };
+  const auto number = [&](std::size_t k) { return std::to_string(acting[k].flight + 1); };
+  if (when == When::moment) return "since " + seconds(acting.front().since_s.value_or(0)) + " of each flight";
+  const std::size_t first = acting.front().flight, n = acting.size();
+  const bool together = acting.back().flight + 1 == first + n;
+  std::string text = n == 1 ? "flight " : "flights ";
+  if (together && n > 1 && first > 0 && first + n == flights) {
+    text = "from flight " + number(0) + " on";
+  } else if (together && n > 1 && first == 0 && n < flights) {
+    text = "up to flight " + number(n - 1);
+  } else {
+    for (std::size_t k = 0; k < n;) {
+      std::size_t last = k;
+      while (last + 1 < n && acting[last + 1].flight == acting[last].flight + 1) ++last;
+      text += (k == 0 ? "" : ", ") + number(k);
+      if (last > k) text += (last > k + 1 ? "-" : ", ") + number(last);
+      k = last + 1;
+    }
   }
-  for (const auto& f : cause.flights) {
-    const std::string in = " s in flight " + std::to_string(f.flight + 1);
-    if (f.since_s) text += ", since " + std::to_string(std::lround(*f.since_s)) + in;
-    if (f.until_s) text += ", until " + std::to_string(std::lround(*f.until_s)) + in;
+  for (std::size_t k = 0; k < n; ++k) {
+    if (acting[k].since_s) text += ", since " + seconds(*acting[k].since_s) + " in flight " + number(k);
+    if (acting[k].until_s) text += ", until " + seconds(*acting[k].until_s) + " in flight " + number(k);
   }
   return text;
+}
+
+std::string where(const NamedCause& cause) {
+  if (cause.flights.empty()) return "";
+  for (const auto& e : cause.found.parameters)
+    if (e.name == "rotor") return "rotor " + std::to_string(static_cast<int>(e.value)) + ", " + cause.when;
+  return cause.when;
 }
 
 }  // namespace backwash::study
