@@ -39,6 +39,11 @@ done
 "$backwash" vehicle fit around:?.csv --vehicle $quad --out proposed.toml --json >keys.json 2>stderr || die "vehicle fit: $(cat stderr)"
 sed "s|^kp = .*|$(grep '^kp' proposed.toml)|; s|^kd = .*|$(grep '^kd' proposed.toml)|; s|^latency = .*|$(grep '^latency' proposed.toml)|; s|^attitude_lag = .*|$(grep '^attitude_lag' proposed.toml)|" other.toml >again.toml
 "$backwash" vehicle check --vehicle again.toml >log || die "what is proposed is no vehicle file"
+# One short log and one that excites nothing stop no fit of three others.
+head -n 250 around:1.csv >short.csv
+"$backwash" vehicle fit around:?.csv short.csv hover:4.csv --vehicle $quad --json >more.json 2>stderr || die "vehicle fit with a short log: $(cat stderr)"
+grep -q 'short.csv:1: holds less than 10 s in the air that can be used; left out' stderr && grep -q 'hover:4.csv does not excite .*; left out' stderr || die "not told: $(cat stderr)"
+python3 -c 'import json; few, more = json.load(open("keys.json")), json.load(open("more.json")); assert few["keys"] == more["keys"] and len(more["left_out"]) == 2'
 status=0
 "$backwash" vehicle fit around:1.csv around:2.csv hover:4.csv --vehicle $quad --out none.toml >log 2>stderr || status=$?
 [[ $status == 65 && ! -e none.toml ]] && grep -q 'hover:4.csv does not excite controller.latency: fly' stderr && ! grep -q 'around:..csv does not excite' stderr ||
