@@ -11,7 +11,7 @@ import re
 import subprocess
 import sys
 
-ROWS = 60
+ROWS = 63
 
 
 def known_tests(build: str) -> list[str]:

@@ -133,7 +133,7 @@ TEST(ULogReader, RealFlightsWithRarePositionsHaveRowsEnoughAndNothingContradicts
     EXPECT_GT(static_cast<double>(log->t_s.size()) / log->t_s.back(), 50) << name;
     // One estimator jumped by 0.4 m: its velocity is not the derivative there.
     if (path.find("log_8") != std::string::npos) continue;
-    for (const auto& what : contradictions(*log)) ADD_FAILURE() << name << ": " << what;
+    for (const auto& doubt : contradictions(*log)) ADD_FAILURE() << name << ": " << doubt.words;
   }
 }
 

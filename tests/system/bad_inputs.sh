@@ -187,9 +187,22 @@ flown() {
     for (i = 0; i < 300; ++i) printf "%.2f,2,2,%.4f,0,0,%g,%g,0,0,0\n", i / 50, z + 0.05 * sin(i / 20), a, q }'
 }
 flown 1.2 9.81 1 >gravity.csv && flown -1.2 0 1 >downwards.csv && flown 1.2 0 0 >no_attitude.csv && flown 1.2 0 1 >sound.csv
-refused 65 "gravity.csv:1: az_mps2 has a median of 9.81 m/s²" study --log sound.csv gravity.csv --vehicle $quad
-refused 65 "downwards.csv:1: z_m is below the map" study --log downwards.csv --vehicle $quad --map builtin:apartment
-refused 65 "no_attitude.csv:1: qw, qx, qy and qz have no length of 1" study --log no_attitude.csv --vehicle $quad
+# tells WORDS ARGUMENTS…: goes on without what is wrong, and says so on stderr
+tells() {
+  "$backwash" "${@:2}" >stdout 2>stderr || { echo "${*:2}: $(cat stderr)"; failed=1; }
+  grep -qF -- "$1" stderr || { echo "${*:2}: '$1' is not said but: $(cat stderr)"; failed=1; }
+}
+refused 65 "gravity.csv:1: az_mps2 has a median of 9.81 m/s²" study --log gravity.csv --vehicle $quad
+tells "gravity.csv:1: az_mps2 has a median of 9.81 m/s²" study --log sound.csv gravity.csv --vehicle $quad --json
+python3 -c 'import json; said = json.load(open("stdout")); assert said["flights"] == 1 and said["left_out"][0]["log"] == "gravity.csv"' || failed=1
+refused 65 "downwards.csv:1: lies where the map lets no craft be: 0.0 % inside of something, 0.0 % too near for its body, 100.0 % outside of the map, first at t_s 0.00 at 2.00,2.00,-1.20" \
+  study --log downwards.csv --vehicle $quad --map builtin:apartment
+tells "no_attitude.csv:1: qw, qx, qy and qz have no length of 1 in 300 of 300 rows" study --log no_attitude.csv --vehicle $quad
+echo "t_s,x_m" >short.csv
+tells "short.csv:1: no column 'y_m'" study --log sound.csv short.csv --vehicle $quad
+"$backwash" study --log gravity.csv short.csv --vehicle $quad >stdout 2>stderr
+[[ $? == 65 && $(wc -l <stderr) == 3 ]] || { echo "none of two logs is left: $(cat stderr)"; failed=1; }
+refused 66 "absent.csv" study --log sound.csv absent.csv --vehicle $quad
 refused 65 "gravity.csv:1: az_mps2" study --log sound.csv --reference gravity.csv --vehicle $quad
 refused 66 "quad-5in: no built-in vehicle; give builtin:quad-5in or" vehicle print quad-5in
 refused 66 "builtin:quad-5in: no built-in daemon" vehicle print builtin:quad-5in --kind daemon

@@ -26,6 +26,27 @@ status=0
 grep -q 'wall refused: no wall closer.*to determine it, hover' stderr || die "the refusal's line: $(cat stderr)"
 "$backwash" calibrate --map builtin:parallel-walls-4m --log poor1.csv poor2.csv poor1.csv --vehicle $quad --keep-base --bootstraps 20 --report kept.html >log 2>stderr ||
   die "--keep-base: $(cat stderr)"
+# A model that no program reads is not written, and the key that is at fault is told.
+for log in two1 two2 four1 four2; do
+  awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i ~ /^a[xyz]_mps2$/) loud[i] } NR > 1 { for (i in loud) $i *= 1e4 } 1' $log.csv >loud_$log.csv
+done
+status=0
+"$backwash" calibrate --map builtin:parallel-walls-2m --log loud_two1.csv loud_two2.csv --map builtin:parallel-walls-4m --log loud_four1.csv \
+  loud_four2.csv --vehicle $quad --bootstraps 20 --out loud.toml >log 2>stderr || status=$?
+[[ $status == 65 && ! -e loud.toml ]] && grep -q "loud.toml:[0-9]*: key 'base.horizontal' = .*needs a number" stderr || die "unreadable model: exit $status, $(cat stderr)"
+# Flights in another room are left out; alone they are an error.
+"$backwash" calibrate --map builtin:parallel-walls-1m --log two1.csv --map builtin:parallel-walls-4m --log four2.csv --vehicle $quad --judge --json >room.json 2>stderr ||
+  die "another room: $(cat stderr)"
+python3 - <<'PYTHON'
+import json
+told = json.load(open("room.json"))
+assert next(iter(told)) == "map_shares" and told["flights"] == 1 and [left["log"] for left in told["left_out"]] == ["two1.csv"]
+wrong, right = told["map_shares"]
+assert wrong["inside"] > 0.1 and wrong["outside"] > 0.1 and right == {"log": "four2.csv", "inside": 0, "too_near": 0, "outside": 0}
+PYTHON
+status=0
+"$backwash" calibrate --map builtin:parallel-walls-1m --log two1.csv --vehicle $quad --judge >log 2>stderr || status=$?
+[[ $status == 65 ]] && grep -q 'two1.csv:1: lies where the map lets no craft be: .*first at t_s' stderr || die "another room alone: exit $status, $(cat stderr)"
 # Logs without a map: a page of a flat floor.
 "$backwash" calibrate --log poor1.csv poor2.csv two1.csv --vehicle $quad --keep-base --bootstraps 20 --report flat.html >log 2>stderr || die "without a map: $(cat stderr)"
 
@@ -39,6 +60,11 @@ done
 "$backwash" vehicle fit around:?.csv --vehicle $quad --out proposed.toml --json >keys.json 2>stderr || die "vehicle fit: $(cat stderr)"
 sed "s|^kp = .*|$(grep '^kp' proposed.toml)|; s|^kd = .*|$(grep '^kd' proposed.toml)|; s|^latency = .*|$(grep '^latency' proposed.toml)|; s|^attitude_lag = .*|$(grep '^attitude_lag' proposed.toml)|" other.toml >again.toml
 "$backwash" vehicle check --vehicle again.toml >log || die "what is proposed is no vehicle file"
+# One short log and one that excites nothing stop no fit of three others.
+head -n 250 around:1.csv >short.csv
+"$backwash" vehicle fit around:?.csv short.csv hover:4.csv --vehicle $quad --json >more.json 2>stderr || die "vehicle fit with a short log: $(cat stderr)"
+grep -q 'short.csv:1: holds less than 10 s in the air that can be used; left out' stderr && grep -q 'hover:4.csv does not excite .*; left out' stderr || die "not told: $(cat stderr)"
+python3 -c 'import json; few, more = json.load(open("keys.json")), json.load(open("more.json")); assert few["keys"] == more["keys"] and len(more["left_out"]) == 2'
 status=0
 "$backwash" vehicle fit around:1.csv around:2.csv hover:4.csv --vehicle $quad --out none.toml >log 2>stderr || status=$?
 [[ $status == 65 && ! -e none.toml ]] && grep -q 'hover:4.csv does not excite controller.latency: fly' stderr && ! grep -q 'around:..csv does not excite' stderr ||

@@ -6,7 +6,7 @@
 source "$(dirname "${BASH_SOURCE[0]}")/verb.sh"
 worlds=${2:?} ctl=${3:?}
 
-"$worlds" --out world --seed 1796100001 --cause trim --confound yaw --flights 12 --truth truth.json >log 2>&1
+"$worlds" --out world --seed 1796100001 --cause trim --confound yaw --flights 18 --truth truth.json >log 2>&1
 model=$(python3 -c 'import json; print(json.load(open("truth.json"))["model"])')
 study=("$backwash" study --map world/map.bt --vehicle world/vehicle.toml --model "$model" --quick --log world/*.csv)
 "${study[@]}" --design next.csv --start 1.6,1.5,1.2 --report study.html --json >study.json 2>stderr || die "$(cat stderr)"

@@ -125,9 +125,11 @@ void acceleration_of_force(FlightLog& log) {
 }
 
 /// Velocity and acceleration of the positions, where the table has none; rows without them are left out.
-FlightLog with_motion(const FlightLog& log) {
+FlightLog with_motion(FlightLog log) {
   const bool v = has_all(log, kVelocity), a = has_all(log, kMeasured);
   if (v && a) return log;
+  if (!v) drop(log, kVelocity);
+  if (!a) drop(log, kMeasured);
   std::vector<Vec3> p;
   for (std::size_t row = 0; row < log.t_s.size(); ++row) p.push_back(at(log, kPosition, row));
   const auto motion = local_cubics(log.t_s, p);
@@ -198,9 +200,11 @@ tl::expected<FlightLog, LogError> import_columns(const std::string& path, const 
                                                  std::vector<std::string>* notes) {
   auto log = import_unchecked(path, map, notes);
   if (!log) return log;
-  if (const auto wrong = contradictions(*log); !wrong.empty())
-    return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + wrong.front()});
-  return log;
+  const auto left_out = leave_out_doubted(*log);
+  if (!left_out) return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + left_out.error()});
+  if (notes)
+    for (const auto& what : *left_out) notes->push_back(path + ": " + what);
+  return left_out->empty() ? log : with_motion(std::move(*log));
 }
 
 tl::expected<FlightLog, LogError> import_unchecked(const std::string& path, const ColumnMap& map,
@@ -238,7 +242,7 @@ tl::expected<FlightLog, LogError> import_unchecked(const std::string& path, cons
     if (!has_all(log, kQuaternion)) return bad("specific force is in the body: give an attitude as well");
     acceleration_of_force(log);
   }
-  log = with_motion(log);
+  log = with_motion(std::move(log));
   if (log.t_s.size() < 100)
     return bad(
         "too few rows around each position for its velocity: give 30 rows a second, or velocity and acceleration");

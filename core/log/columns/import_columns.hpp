@@ -7,6 +7,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "core/log/columns/column_law.hpp"
 #include "core/log/columns/flight_log.hpp"
 
 namespace backwash::log {
@@ -38,21 +39,21 @@ std::vector<std::vector<std::string>> column_families();
 /// pitch, yaw (z-y-x). Acceleration: ax_mps2 …, or specific_force_x … turned by the attitude, gravity taken off.
 /// Velocity and acceleration that the table lacks are local_cubics'. Errors: as read_csv; a column that is not there;
 /// stamps that go back; fewer than 20 rows a second or more than 5000 (the unit of the time?); specific force without
-/// attitude; what physics contradicts (contradictions()).
+/// attitude; what physics contradicts as a whole. A column that it contradicts alone is left out, and told in `notes`
+/// (leave_out_doubted()); a velocity or an acceleration that lost a column so is then of the positions.
 tl::expected<FlightLog, LogError> import_columns(const std::string& path, const ColumnMap& map,
                                                  std::vector<std::string>* notes = nullptr);
 /// The same, whatever physics says of it.
 tl::expected<FlightLog, LogError> import_unchecked(const std::string& path, const ColumnMap& map,
                                                    std::vector<std::string>* notes = nullptr);
 
-/// What in a log cannot be, each in one sentence: velocity is not the derivative of position, acceleration not that of
-/// velocity, gravity is still in it, the attitude does not tilt where the craft accelerates, thrust is no share of 1.
-/// A signed or scaled axis that would fit is named. Says nothing about what the flight did not move enough to show.
-std::vector<std::string> contradictions(const FlightLog& log);
-/// Those of them that no noise, estimator or accident of a flight explains: a factor of 3, a sign or another axis. And
-/// stamps that do not rise or are no seconds, velocities or accelerations that are 0 in every row while the craft
-/// moves, attitudes of no length or in another order.
-std::vector<std::string> impossible(const FlightLog& log);
+/// What in a log cannot be: velocity is not the derivative of position, acceleration not that of velocity, gravity is
+/// still in it, the attitude does not tilt where the craft accelerates or is none, thrust is no share of 1, columns are
+/// 0 in every row while the craft moves. Axes are judged by doubts_of(): what the flight did not move says nothing.
+std::vector<ColumnDoubt> contradictions(const FlightLog& log);
+/// Takes doubted columns out of a log and tells each in a sentence. Refused, with what would be right: a log that is in
+/// doubt as a whole (ColumnDoubt::whole), and stamps that do not rise or are no seconds.
+tl::expected<std::vector<std::string>, std::string> leave_out_doubted(FlightLog& log);
 
 /// The columns of sensors that never spoke: the rpm, the motors' commands, the thrust or the battery, 0 in every row.
 std::vector<std::string> silent_columns(const FlightLog& log);

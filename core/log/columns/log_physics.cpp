@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 
+#include "core/log/columns/column_law.hpp"
 #include "core/log/columns/import_columns.hpp"
 #include "core/log/columns/local_cubic.hpp"
 #include "core/log/columns/log_columns.hpp"
@@ -16,27 +17,27 @@
 namespace backwash::log {
 namespace {
 
-constexpr double kLeastSpeed = 0.05;         // m/s, rms: less says nothing of velocity's axes
+constexpr double kLeastSpeed = 0.05;         // m/s, rms: what a sane velocity may be off by
 constexpr double kLeastAcceleration = 0.25;  // m/s², rms
-constexpr double kSettled = 0.06;            // s on each side: what measured accelerations are averaged over
+constexpr double kSettled = 0.06;            // s on each side: what accelerations are averaged over beside tilts
+constexpr double kMostThrustToWeight = 2.5;  // on the mean, or its inverse: what a tilt may accelerate more, or less
 constexpr double kFollows = 0.7;             // correlation from which an axis follows another
-constexpr double kClearly = 0.05;            // by which one correlation is more than another
-constexpr double kStranger = 0.3;            // below it two that moved have nothing to do with each other
-/// Slopes that are right, and whether what has nothing to do with its derivative is wrong.
-struct Bounds {
-  double velocity[2], acceleration[2];
-  double tilt[2];  // thrust differs from weight, and drag tilts as well
-  bool strangers;
-};
-constexpr Bounds kImported{{0.8, 1.25}, {0.6, 1.6}, {0.4, 2.5}, true};
-constexpr Bounds kPossible{{1 / 3.0, 3}, {1 / 3.0, 3}, {0.2, 5}, false};
-constexpr double kLongestStep = 0.5;      // s, between rows on the median
-constexpr double kLength[] = {0.9, 1.1};  // of an attitude
-constexpr double kGravityLeft = 2.5;      // m/s², of the median vertical acceleration
+constexpr double kStranger = 0.3;            // below it two have nothing to do with each other
+constexpr double kLongestStep = 0.5;         // s, between rows on the median
+constexpr double kLength[] = {0.9, 1.1};     // of an attitude
+constexpr double kGravityLeft = 2.5;         // m/s², of the median vertical acceleration
 constexpr double kMostThrust = 1.2, kLeastThrust = -0.05;
 
 using Names = std::array<const char*, 3>;
 using Vectors = std::vector<Vec3>;
+
+constexpr Names kP{"x_m", "y_m", "z_m"}, kV{"vx_mps", "vy_mps", "vz_mps"}, kA{"ax_mps2", "ay_mps2", "az_mps2"};
+constexpr std::array kQ{"qw", "qx", "qy", "qz"};
+
+template <typename Columns>
+std::vector<std::string> list(const Columns& names) {
+  return {names.begin(), names.end()};
+}
 
 Vectors rows_of(const FlightLog& log, const Names& names) {
   Vectors rows;
@@ -58,51 +59,31 @@ Vectors averaged(const std::vector<double>& t, const Vectors& rows) {
   return means;
 }
 
-struct Pairing {
-  const char* what;     ///< "velocity"
-  const char* of_what;  ///< "the derivative of position"
-  Names said;           ///< columns of `what`
-  Names wanted;         ///< of what it should follow
-  double least;         ///< rms of an axis that says something
-  const double (&right)[2];
-  bool strangers;
-  int axes = 3;
-};
-
-/// How an axis goes with another one, means taken off both: slope and correlation.
-struct Match {
-  int axis;  // the other
-  double slope, correlation;
-};
-Match match_of(const Vectors& said, int axis, const Vectors& shown, int other) {
-  const auto n = static_cast<double>(said.size());
-  double mean_said = 0, mean_shown = 0, ss = 0, dd = 0, sd = 0;
-  for (std::size_t i = 0; i < said.size(); ++i) {
-    mean_said += said[i][axis] / n;
-    mean_shown += shown[i][other] / n;
-  }
-  for (std::size_t i = 0; i < said.size(); ++i) {
-    const double s = said[i][axis] - mean_said, d = shown[i][other] - mean_shown;
-    ss += s * s;
-    dd += d * d;
-    sd += s * d;
-  }
-  return {other, dd > 0 ? sd / dd : 0, ss > 0 && dd > 0 ? sd / std::sqrt(ss * dd) : 0};
+/// The way that rows lead from 0 on.
+Vectors integral(const std::vector<double>& t, const Vectors& rows) {
+  Vectors sums(rows.size(), Vec3::Zero());
+  for (std::size_t i = 1; i < rows.size(); ++i)
+    sums[i] = sums[i - 1] + 0.5 * (t[i] - t[i - 1]) * (rows[i] + rows[i - 1]);
+  return sums;
 }
 
-/// With the axis of `shown` that an axis of `said` goes with best: itself, unless another one does clearly better, and
-/// better than because it goes with what is said along that one. On a way between two axes a leap of the estimate along
-/// one of them would make it a stranger to its own.
-Match best_match(const Vectors& said, const Vectors& shown, int axis, int axes) {
-  Match best = match_of(said, axis, shown, axis);
-  for (int other = 0; other < axes; ++other) {
-    if (other == axis) continue;
-    const Match match = match_of(said, axis, shown, other);
-    const double led =
-        std::abs(match_of(said, axis, said, other).correlation * match_of(said, other, shown, other).correlation);
-    if (std::abs(match.correlation) > std::max(std::abs(best.correlation), led) + kClearly) best = match;
+/// Derivatives of the positions, and what the rows themselves say, both through the same filter: local_cubics of the
+/// way that the rows lead.
+struct Both {
+  Vectors derived, said;
+};
+Both both_of(const FlightLog& log, const Names& names, bool second) {
+  const auto motion = local_cubics_but_for_holds(log.t_s, rows_of(log, kP));
+  Vectors way = integral(log.t_s, rows_of(log, names));
+  if (second) way = integral(log.t_s, way);
+  const auto said = local_cubics(log.t_s, way);
+  Both both;
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    if (!motion[i] || !said[i]) continue;
+    both.derived.push_back(second ? motion[i]->a : motion[i]->v);
+    both.said.push_back(second ? said[i]->a : said[i]->v);
   }
-  return best;
+  return both;
 }
 
 double rms(const Vectors& rows, int axis) {
@@ -110,24 +91,6 @@ double rms(const Vectors& rows, int axis) {
   for (const Vec3& v : rows) mean += v[axis] / static_cast<double>(rows.size());
   for (const Vec3& v : rows) sum += (v[axis] - mean) * (v[axis] - mean);
   return std::sqrt(sum / static_cast<double>(rows.size()));
-}
-
-void pair_up(const Pairing& p, const Vectors& said, const Vectors& shown, std::vector<std::string>& wrong) {
-  for (int axis = 0; axis < p.axes; ++axis) {
-    if (rms(shown, axis) < p.least && rms(said, axis) < p.least) continue;
-    const Match match = best_match(said, shown, axis, p.axes);
-    const auto i = static_cast<std::size_t>(axis), j = static_cast<std::size_t>(match.axis);
-    const double r = std::abs(match.correlation);
-    if (r >= kFollows) {
-      if (match.axis == axis && match.slope >= p.right[0] && match.slope <= p.right[1]) continue;
-      wrong.push_back(std::string(p.said[i]) + " is " + formatted("%.3g", match.slope) + " times " + p.of_what +
-                      " of " + p.wanted[j] + ": a wrong unit, sign, axis or frame");
-    } else if (p.strangers && r < kStranger && rms(shown, axis) > 2 * p.least && rms(said, axis) > 2 * p.least) {
-      wrong.push_back(std::string(p.said[i]) + " has nothing to do with " + p.of_what + " of " + p.wanted[i] +
-                      " (correlation " + formatted("%.2f", match.correlation) + "): are the " + p.what +
-                      "'s columns named rightly?");
-    }
-  }
 }
 
 /// Directions of the body's z axis, times gravity: what a thrust of the weight along it accelerates sideways.
@@ -140,62 +103,43 @@ Vectors tilts(const FlightLog& log) {
   return rows;
 }
 
-/// Vectors of both where the first is known.
-struct Both {
-  Vectors derived, said;
-};
+using Doubts = std::vector<ColumnDoubt>;
+void add(Doubts& doubts, Doubts more) { std::ranges::move(more, std::back_inserter(doubts)); }
 
-constexpr Names kP{"x_m", "y_m", "z_m"}, kV{"vx_mps", "vy_mps", "vz_mps"}, kA{"ax_mps2", "ay_mps2", "az_mps2"};
-constexpr std::array kQ{"qw", "qx", "qy", "qz"};
-
-/// Both where the motion is known.
-Both where_known(const std::vector<std::optional<LocalMotion>>& motion, const Vectors& said, bool second) {
-  Both both;
-  for (std::size_t i = 0; i < said.size(); ++i)
-    if (motion[i]) {
-      both.derived.push_back(second ? motion[i]->a : motion[i]->v);
-      both.said.push_back(said[i]);
-    }
-  return both;
+Doubts of_motion(const FlightLog& log, const Names& names, bool second) {
+  const auto both = both_of(log, names, second);
+  return doubts_of({list(names), list(kP), second ? "the second derivative" : "the derivative",
+                    second ? kLeastAcceleration : kLeastSpeed, nearest_unit(names[0], kP[0]), true},
+                   both.said, both.derived);
 }
 
-std::vector<std::string> contradictions(const FlightLog& log, const Bounds& bounds) {
-  std::vector<std::string> wrong;
-  const auto motion = local_cubics_but_for_holds(log.t_s, rows_of(log, kP));
-  if (has_all(log, kV)) {
-    const auto v = where_known(motion, rows_of(log, kV), false);
-    pair_up({"velocity", "the derivative", kV, kP, kLeastSpeed, bounds.velocity, bounds.strangers}, v.said, v.derived,
-            wrong);
-  }
-  if (has_all(log, kA)) {
-    const Vectors measured = averaged(log.t_s, rows_of(log, kA));
-    std::vector<double> up;
-    for (const Vec3& a : measured) up.push_back(a.z());
-    if (const double left = median(up); std::abs(left) > kGravityLeft)
-      wrong.push_back("az_mps2 has a median of " + formatted("%.2f", left) +
-                      " m/s²: gravity is in it, or its unit, sign or frame is wrong");
-    const auto a = where_known(motion, measured, true);
-    pair_up(
-        {"acceleration", "the second derivative", kA, kP, kLeastAcceleration, bounds.acceleration, bounds.strangers},
-        a.said, a.derived, wrong);
-    if (has_all(log, kQ))
-      pair_up({"attitude",
-               "the tilt that accelerates along the axis",
-               {"tilt along x", "tilt along y", ""},
-               kA,
-               kLeastAcceleration,
-               bounds.tilt,
-               bounds.strangers,
-               2},
-              averaged(log.t_s, tilts(log)), measured, wrong);
-  }
-  if (log.has("thrust")) {
-    const auto [least, most] = std::ranges::minmax(log.column("thrust"));
-    if (least < kLeastThrust || most > kMostThrust)
-      wrong.push_back("thrust goes from " + formatted("%.3g", least) + " to " + formatted("%.3g", most) +
-                      ": it is a share, 0 … 1; give its unit");
-  }
-  return wrong;
+Doubts of_gravity(const FlightLog& log) {
+  const double left = median(log.column("az_mps2"));
+  if (std::abs(left) <= kGravityLeft) return {};
+  return {{{"az_mps2"},
+           "az_mps2 has a median of " + formatted("%.2f", left) +
+               " m/s²: gravity is in it, or its unit, sign or frame is wrong; take 9.81 off, or give specific_force_z",
+           true}};
+}
+
+Doubts of_tilt(const FlightLog& log) {
+  return doubts_of({{"tilt along x (pitch)", "tilt along y (roll)"},
+                    {"ax_mps2", "ay_mps2"},
+                    "the tilt that accelerates along the axis",
+                    kLeastAcceleration,
+                    kMostThrustToWeight,
+                    false,
+                    list(kQ)},
+                   averaged(log.t_s, tilts(log)), averaged(log.t_s, rows_of(log, kA)));
+}
+
+Doubts of_thrust(const FlightLog& log) {
+  const auto [least, most] = std::ranges::minmax(log.column("thrust"));
+  if (least >= kLeastThrust && most <= kMostThrust) return {};
+  return {{{"thrust"},
+           "thrust goes from " + formatted("%.3g", least) + " to " + formatted("%.3g", most) +
+               ": it is a share, 0 … 1; give its unit",
+           true}};
 }
 
 /// Stamps that are none of a flight.
@@ -221,19 +165,13 @@ bool silent(const FlightLog& log, std::span<const char* const> names) {
 }
 
 /// Velocities or accelerations that are 0 while the positions move.
-void zeros(const FlightLog& log, std::vector<std::string>& wrong) {
-  const auto motion = local_cubics_but_for_holds(log.t_s, rows_of(log, kP));
-  for (const bool second : {false, true}) {
-    const Names& names = second ? kA : kV;
-    if (!silent(log, names)) continue;
-    const auto both = where_known(motion, rows_of(log, names), second);
-    for (int axis = 0; axis < 3 && !both.derived.empty(); ++axis)
-      if (rms(both.derived, axis) > 2 * (second ? kLeastAcceleration : kLeastSpeed)) {
-        wrong.push_back(std::string(names[0]) + ", " + names[1] + " and " + names[2] +
-                        " are 0 in every row, and the craft moves; leave out columns that nothing has measured");
-        break;
-      }
-  }
+Doubts of_zeros(const FlightLog& log, const Names& names, bool second) {
+  const auto both = both_of(log, names, second);
+  for (int axis = 0; axis < 3 && !both.derived.empty(); ++axis)
+    if (rms(both.derived, axis) > 2 * (second ? kLeastAcceleration : kLeastSpeed))
+      return {{list(names), std::string(names[0]) + ", " + names[1] + " and " + names[2] +
+                                " are 0 in every row, and the craft moves: nothing has measured them"}};
+  return {};
 }
 
 /// How the tilts go with the accelerations along x and y: the smaller correlation of the two. Nothing of a flight that
@@ -243,48 +181,72 @@ std::optional<double> tilts_along(const FlightLog& log) {
   double least = 1;
   for (int axis = 0; axis < 2; ++axis) {
     if (rms(measured, axis) < kLeastAcceleration) return std::nullopt;
-    const Match match = best_match(tilted, measured, axis, 2);
-    least = std::min(least, match.axis == axis ? match.correlation : 0.0);
+    std::vector<double> x, y;
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      x.push_back(measured[i][axis]);
+      y.push_back(tilted[i][axis]);
+    }
+    least = std::min(least, gain_of(x, y).correlation);
   }
   return least;
 }
 
-void attitudes(const FlightLog& log, std::vector<std::string>& wrong) {
-  if (!has_all(log, kQ)) return;
+/// An attitude of no length, or whose parts stand in another order.
+Doubts of_attitude(const FlightLog& log) {
   std::size_t bad = 0;
   for (std::size_t i = 0; i < log.t_s.size(); ++i) {
     double square = 0;
     for (const char* name : kQ) square += std::pow(log.column(name)[i], 2);
     bad += std::sqrt(square) < kLength[0] || std::sqrt(square) > kLength[1] ? 1u : 0u;
   }
-  if (bad > 0) {
-    wrong.push_back("qw, qx, qy and qz have no length of 1 in " + std::to_string(bad) + " of " +
-                    std::to_string(log.t_s.size()) + " rows; leave out rows, or columns, without an attitude");
-    return;
-  }
-  if (!has_all(log, kA)) return;
-  const auto as_it_is = tilts_along(log);
-  if (!as_it_is || *as_it_is >= kStranger) return;
-  for (const auto& [order, w] : {std::pair{"x, y, z, w", 3UL}, {"z, w, x, y", 1UL}}) {
-    FlightLog turned = log;  // the scalar is in column w, and x, y, z are in those after it
-    for (std::size_t k = 0; k < 4; ++k) turned.columns[kQ[k]] = log.column(kQ[(w + k) % 4]);
-    if (*tilts_along(turned) >= kFollows)
-      wrong.push_back(std::string("qw, qx, qy and qz tilt the craft where it accelerates if they are read as ") +
-                      order + ": are they named rightly?");
-  }
+  if (bad > 0)
+    return {{list(kQ), "qw, qx, qy and qz have no length of 1 in " + std::to_string(bad) + " of " +
+                           std::to_string(log.t_s.size()) + " rows: leave out rows without an attitude"}};
+  if (!has_all(log, kA)) return {};
+  if (const auto as_it_is = tilts_along(log); as_it_is && *as_it_is < kStranger)
+    for (const auto& [order, w] : {std::pair{"x, y, z, w", 3UL}, {"z, w, x, y", 1UL}}) {
+      FlightLog turned = log;  // the scalar is in column w, and x, y, z are in those after it
+      for (std::size_t k = 0; k < 4; ++k) turned.columns[kQ[k]] = log.column(kQ[(w + k) % 4]);
+      if (*tilts_along(turned) >= kFollows)
+        return {{list(kQ),
+                 std::string("qw, qx, qy and qz tilt the craft where it accelerates if they are read as ") + order +
+                     ": are they named rightly?",
+                 true}};
+    }
+  return has_all(log, kA) ? of_tilt(log) : Doubts{};
 }
 
 }  // namespace
 
-std::vector<std::string> contradictions(const FlightLog& log) { return contradictions(log, kImported); }
+Doubts contradictions(const FlightLog& log) {
+  Doubts doubts;
+  for (const bool second : {false, true}) {
+    const Names& names = second ? kA : kV;
+    if (!has_all(log, names)) continue;
+    add(doubts, silent(log, names) ? of_zeros(log, names, second) : of_motion(log, names, second));
+  }
+  if (has_all(log, kA)) add(doubts, of_gravity(log));
+  if (has_all(log, kQ)) add(doubts, of_attitude(log));
+  if (log.has("thrust")) add(doubts, of_thrust(log));
+  return doubts;
+}
 
-std::vector<std::string> impossible(const FlightLog& log) {
-  if (log.t_s.size() < 2) return {};
-  if (const auto stamps = wrong_stamps(log)) return {*stamps};
-  auto wrong = contradictions(log, kPossible);
-  zeros(log, wrong);
-  attitudes(log, wrong);
-  return wrong;
+tl::expected<std::vector<std::string>, std::string> leave_out_doubted(FlightLog& log) {
+  std::vector<std::string> told;
+  if (log.t_s.size() < 2) return told;
+  if (const auto stamps = wrong_stamps(log)) return tl::make_unexpected(*stamps);
+  const auto doubts = contradictions(log);
+  if (const auto whole = std::ranges::find_if(doubts, &ColumnDoubt::whole); whole != doubts.end())
+    return tl::make_unexpected(whole->words);
+  for (const auto& doubt : doubts) {
+    std::string names;
+    for (const auto& name : doubt.columns) {
+      log.columns.erase(name);
+      names += (names.empty() ? "" : ", ") + name;
+    }
+    told.push_back(doubt.words + "; left out: " + names);
+  }
+  return told;
 }
 
 std::vector<std::string> silent_columns(const FlightLog& log) {

@@ -258,7 +258,7 @@ std::string study_page(const StudyResult& result, const Observations& seen, cons
   page +=
       "<p class=\"context\">Map " + report::escaped(context.map.empty() ? "none" : context.map) + ", vehicle " +
       report::escaped(context.vehicle) + ", model " + report::escaped(context.model) + "; backwash " +
-      report::escaped(context.version) + "</p>\n<p class=\"verdict " +
+      report::escaped(context.version) + "</p>\n" + context.first + "<p class=\"verdict " +
       (result.verdict == StudyVerdict::cause_found || (result.verdict == StudyVerdict::nothing_found && beside.empty())
            ? "passed"
            : "failed") +

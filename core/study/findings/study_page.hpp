@@ -23,6 +23,7 @@ struct PageContext {
   /// The file as read: what to change is told with its values. Without it nothing is.
   std::optional<Vehicle> read_vehicle = {};
   std::vector<std::string> logs = {};  ///< names of the observed flights, in their order
+  std::string first = {};              ///< HTML that stands before all else: what was left out, and where flights lie
 };
 
 /// One self-contained HTML page, read in two minutes: verdict, residual against the named variable before and after,

@@ -132,9 +132,10 @@ int judge(const Campaign& campaign, const Model& model, const CalibrateOptions& 
   const auto judged = assess(campaign.data, ln_bounds(campaign.data, parameters_of(model)), options.quantile);
   if (options.json) {
     json["judged"] = to_json(judged, campaign.logs);
-    print(json);
+    print(told_first(campaign.notes, json));
   } else {
     const Vec3& c = judged.coverage;
+    print_text(campaign.notes);
     std::printf("%zu windows, share below %s: x %.3f y %.3f z %.3f\n", judged.windows, options.base_model.c_str(),
                 c.x(), c.y(), c.z());
   }
@@ -151,7 +152,9 @@ void check(const CalibrateOptions& options) {
 Campaign campaign_of(const CalibrateOptions& options, const std::optional<Vehicle>& vehicle, const Model& gates) {
   Campaign campaign = empty_campaign(options.files);
   std::vector<CalibratedLog> logs;
-  read_logs(options.files, campaign.maps, vehicle, gates, [&](CalibratedLog&& log) { logs.push_back(std::move(log)); });
+  campaign.notes.verb = "backwash calibrate";
+  read_logs(options.files, campaign.maps, vehicle, gates, campaign.notes,
+            [&](CalibratedLog&& log) { logs.push_back(std::move(log)); });
   add_logs(campaign, std::move(logs), options.seed);
   return campaign;
 }
@@ -169,7 +172,7 @@ int run(const CalibrateOptions& options) {
   json["refused"] = to_json(refused);
   const bool nothing = !refused.empty() && refused.front().of_everything();
   if (nothing || (!refused.empty() && !options.keep_base)) {
-    if (options.json) print(json);
+    if (options.json) print(told_first(campaign.notes, json));
     throw Failure(kBadData, refusal_line(refused) +
                                 (nothing ? "" : "; or give --keep-base to take these constants from the base model"));
   }
@@ -191,8 +194,9 @@ int run(const CalibrateOptions& options) {
   if (options.json) {
     add(json, calibration, campaign);
     if (!options.out.empty()) json["model"] = options.out;
-    print(json);
+    print(told_first(campaign.notes, json));
   } else {
+    print_text(campaign.notes);
     print_text(calibration, options);
     if (!refused.empty()) std::printf("kept from the base model: %s\n", refusal_line(refused).c_str());
   }

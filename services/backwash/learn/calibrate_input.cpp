@@ -71,19 +71,22 @@ Campaign empty_campaign(const CampaignFiles& files) {
 }
 
 void read_logs(const CampaignFiles& files, const std::vector<map::OccupancyGrid>& maps,
-               const std::optional<Vehicle>& vehicle, const Model& gates,
+               const std::optional<Vehicle>& vehicle, const Model& gates, LogNotes& notes,
                const std::function<void(CalibratedLog&&)>& take) {
   const bool mapless = files.maps.empty();
   study::WindowOptions options;
   options.tau_w = gates.bound.tau_w;
   if (mapless) options = mapless_windows(gates);
-  for (const auto& file : files.logs) {
-    const std::size_t place = place_of(files, file);
-    const auto log = read_flight(file.path);
-    auto flight = study::flight_windows(log, vehicle, options, file.path);
+  std::vector<std::string> paths;
+  for (const auto& file : files.logs) paths.push_back(file.path);
+  std::size_t next = 0;
+  each_readable(paths, notes, [&](const std::string& path) {
+    const std::size_t place = place_of(files, files.logs[next++]);
+    const auto log = read_flight(path);
+    auto flight = study::flight_windows(log, vehicle, options, path);
     if (!flight) throw Failure(kBadData, flight.error().message);
-    CalibratedLog one{file.path, place, flight->signal, flight->gated, flight->not_tested, flight->windows.size(),
-                      {},        {}};
+    if (!mapless) notes.place(path, study::map_share(log, maps[place], vehicle.value_or(Vehicle{})));
+    CalibratedLog one{path, place, flight->signal, flight->gated, flight->not_tested, flight->windows.size(), {}, {}};
     if (mapless) {
       one.map.reset();
       one.heights = height_rows(*flight, log, 0);
@@ -91,7 +94,7 @@ void read_logs(const CampaignFiles& files, const std::vector<map::OccupancyGrid>
     }
     one.hovers = hovers_of(*flight, 0, maps[place], gates);
     take(std::move(one));
-  }
+  });
 }
 
 void add_logs(Campaign& campaign, std::vector<CalibratedLog> logs, std::uint64_t seed) {
@@ -130,7 +133,7 @@ std::optional<HeightEffects> read_height_effects(const std::vector<std::string>&
   for (std::size_t k = 0; k < logs.size(); ++k) {
     const auto log = read_flight(logs[k]);
     const auto flight = study::flight_windows(log, std::nullopt, mapless_windows(gates), logs[k]);
-    if (!flight) throw Failure(kBadData, flight.error().message);
+    if (!flight) continue;  // of a study's flights: too short, or without accelerations
     const auto more = height_rows(*flight, log, k);
     rows.insert(rows.end(), more.begin(), more.end());
   }

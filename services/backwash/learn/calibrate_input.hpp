@@ -9,6 +9,7 @@
 
 #include "core/study/calibrate/height_effect.hpp"
 #include "core/types/model.hpp"
+#include "services/backwash/learn/log_notes.hpp"
 #include "services/command_line/command_line.hpp"
 
 namespace backwash::services {
@@ -47,16 +48,17 @@ struct Campaign {
   std::array<std::size_t, study::kHoverGates> gated{};
   std::vector<std::string> not_tested;
   std::size_t windows = 0;
+  LogNotes notes;
   std::optional<study::calibrate::HeightEffect> height;  ///< without a map: what the logs say of height and ceiling
 };
 
 /// The maps by place: those of `files`, or a flat floor.
 Campaign empty_campaign(const CampaignFiles& files);
 /// Reads each log and gives what it is worth to `take`. Without a map the floor is flat, at the log's `surface_z_m` or
-/// z = 0, and passes count as hovers: the height effect holds the speed fixed. Throws Failure with the file that is at
-/// fault.
+/// z = 0, and passes count as hovers: the height effect holds the speed fixed. What cannot be read, or lies elsewhere
+/// than in its map, is left out and noted. Throws Failure with the file that is at fault, where none is left.
 void read_logs(const CampaignFiles& files, const std::vector<map::OccupancyGrid>& maps,
-               const std::optional<Vehicle>& vehicle, const Model& gates,
+               const std::optional<Vehicle>& vehicle, const Model& gates, LogNotes& notes,
                const std::function<void(CalibratedLog&&)>& take);
 /// Puts logs together in their order. Throws Failure 65 where only some have set-points.
 void add_logs(Campaign& campaign, std::vector<CalibratedLog> logs, std::uint64_t seed);

@@ -125,7 +125,8 @@ std::string calibrate_page(const Calibration& c, const Campaign& campaign, std::
                            const CalibratePageContext& context) {
   std::string page = "<h1>Hover variances under the calibrated bound</h1>\n<p class=\"context\">" +
                      std::to_string(campaign.windows) + " windows of " + std::to_string(campaign.logs.size()) +
-                     " flights; backwash " + report::escaped(kVersion) + "</p>\n" + verdict_of(c, context.quantile);
+                     " flights; backwash " + report::escaped(kVersion) + "</p>\n" + html(campaign.notes) +
+                     verdict_of(c, context.quantile);
   page += refusals_html(refused) + constants(c) +
           bins(c.held_out.by_wall_distance, "distance from walls", "distance, m") +
           bins(c.held_out.by_height, "height", "height, m") + flights(c.held_out, campaign.logs) +

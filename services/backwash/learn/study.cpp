@@ -58,10 +58,10 @@ void refuse_other_numbers(const std::vector<std::string>& logs) {
 
 /// Flights known to be sound; nothing without such.
 std::optional<study::Observations> sound_flights(const StudyOptions& options, const Vehicle& vehicle,
-                                                 const Model& model) {
+                                                 const Model& model, LogNotes& notes) {
   if (options.reference.empty()) return std::nullopt;
   study::Observer observer(vehicle, model, nullptr);
-  for (const auto& path : options.reference) observer.add(read_studied(path));
+  each_readable(options.reference, notes, [&](const auto& path) { observer.add(read_studied(path, notes)); });
   return observer.finish();
 }
 
@@ -80,12 +80,13 @@ std::optional<study::RotorVerdict> against_reference(const StudyOptions& options
 
 /// Ratios of the vertical variance by height and plate, day and speed held fixed, of recordings that say what they
 /// stood on and under (`backwash import airgarage`).
-std::optional<study::calibrate::HeightEffects> height_effects(const StudyOptions& options, const Model& model,
+std::optional<study::calibrate::HeightEffects> height_effects(const StudyOptions& options,
+                                                              const std::vector<std::string>& logs, const Model& model,
                                                               const study::Observations& seen) {
   if (!options.map.empty() || !seen.has(study::Source::ceiling)) return std::nullopt;
   if (!options.from.empty())
     throw Failure(kUsage, options.from + ":1: logs with a ceiling column need a --map, or --log in place of --from");
-  return read_height_effects(options.logs, model, options.seed);
+  return read_height_effects(logs, model, options.seed);
 }
 
 /// What one log at a time is asked for, and what needs more than is kept of each.
@@ -157,11 +158,14 @@ Flights read_flights(const StudyOptions& options, const LookedWith& with) {
   std::vector<StudiedFlight> studied;
   std::vector<log::FlightLog> logs;
   if (options.from.empty()) {
-    for (const auto& path : options.logs)
+    each_readable(options.logs, with.notes, [&](const auto& path) {
       studied.push_back(look_at(path, options.group, with, options.residuals ? &logs : nullptr));
+    });
   } else {
     progress("reading " + options.from);
     studied = read_study_rows(options.from, {options.vehicle, options.model, options.map, options.group});
+    for (const auto& flight : studied)
+      if (flight.place) with.notes.place(flight.path, *flight.place);
   }
   progress("looking for flights that come twice");
   auto flights = each_once(std::move(studied), !options.group.empty(), std::move(logs));
@@ -170,12 +174,12 @@ Flights read_flights(const StudyOptions& options, const LookedWith& with) {
 }
 
 int print_rows(const StudyOptions& options, const LookedWith& with) {
-  for (const auto& path : options.logs) {
+  each_readable(options.logs, with.notes, [&](const auto& path) {
     const auto row = study_row(look_at(path, options.group, with, nullptr),
                                {options.vehicle, options.model, options.map, options.group});
     end_progress();
     std::fputs(row.c_str(), stdout);
-  }
+  });
   return kOk;
 }
 
@@ -191,10 +195,11 @@ int run(const StudyOptions& options) {
   const auto room = options.map.empty() ? std::nullopt : std::optional(read_map(options.map));
   const map::OccupancyGrid* grid = room ? &*room : nullptr;
   study::MapView surroundings(grid, model);
-  const LookedWith with{vehicle, model, grid, surroundings};
+  LogNotes notes{"backwash study", {}, {}, {}};
+  const LookedWith with{vehicle, model, grid, surroundings, notes};
   if (options.rows) return print_rows(options, with);
   Flights flights = read_flights(options, with);
-  const auto sound = sound_flights(options, vehicle, model);
+  const auto sound = sound_flights(options, vehicle, model, notes);
   auto chosen = study_options(options, sound);
   auto seen = observations(flights, with);
   const auto measured = options.residuals ? seen : study::Observations{};  // nothing that the model holds taken out
@@ -205,7 +210,7 @@ int run(const StudyOptions& options) {
   Json json = services::to_json(result, seen, vehicle, names);
   add_left_out(json, terms.left, flights);
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};
-  const auto height = height_effects(options, model, seen);
+  const auto height = height_effects(options, flights.paths, model, seen);
   if (height) json["height_effect"] = services::to_json(*height);
   const auto rotors = against_reference(options, sound, seen);
   if (rotors) json["rotors_against_reference"] = services::to_json(*rotors);
@@ -224,9 +229,11 @@ int run(const StudyOptions& options) {
       beside += residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen), data);
     write_page(options, result, seen,
                {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, data,
-                vehicle, names});
+                vehicle, names, html(notes)});
   }
-  options.json ? print(json) : services::print_text(result, seen, vehicle, names, consequence, rotors, height);
+  if (!options.json) print_text(notes);
+  options.json ? print(told_first(notes, json))
+               : services::print_text(result, seen, vehicle, names, consequence, rotors, height);
   if (!options.json) print_beside(flights, design, options.design);
   return kOk;
 }

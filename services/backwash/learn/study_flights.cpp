@@ -10,24 +10,14 @@
 #include "core/log/autopilot/dataflash.hpp"
 #include "core/log/autopilot/ulog.hpp"
 #include "core/log/columns/import_columns.hpp"
-#include "core/log/columns/median.hpp"
 #include "core/log/raw/raw_flight.hpp"
 #include "core/study/windows/observer.hpp"
 #include "core/study/windows/signals/same_gusts.hpp"
-#include "core/types/formatted.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
 namespace {
-
-/// A flight that is below the map's lowest voxel most of the time has its heights downwards, or another map.
-void refuse_below(const std::string& path, const log::FlightLog& log, const map::OccupancyGrid& grid) {
-  const auto& z = log.column("z_m");
-  if (!z.empty() && log::median(z) < grid.origin().z())
-    throw Failure(kBadData, path + ":1: z_m is below the map in most rows (median " +
-                                formatted("%.2f", log::median(z)) + " m): heights are upwards, in the map's frame");
-}
 
 /// Leaves out each flight that is another one again, both by their numbers.
 void leave_out(Flights& flights, const std::vector<std::pair<std::size_t, std::size_t>>& twins) {
@@ -59,27 +49,34 @@ log::FlightLog read_flight(const std::string& path) {
   return read_or_fail(path.ends_with(".ulg") ? log::read_ulog(path) : log::read_dataflash(path));
 }
 
-log::FlightLog read_studied(const std::string& path) {
+log::FlightLog read_studied(const std::string& path, LogNotes& notes) {
   auto log = read_flight(path);
   for (const char* name : {"x_m", "y_m", "z_m"})
     if (!log.has(name))
       throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
   for (const auto& name : log::silent_columns(log)) log.columns.erase(name);
   if (is_autopilots_log(path)) return log;
-  if (const auto wrong = log::impossible(log); !wrong.empty()) throw Failure(kBadData, path + ":1: " + wrong.front());
+  const auto left_out = log::leave_out_doubted(log);
+  if (!left_out) throw Failure(kBadData, path + ":1: " + left_out.error());
+  for (const auto& what : *left_out) notes.column(path, what);
   return log;
 }
 
 StudiedFlight look_at(const std::string& path, const std::string& group, const LookedWith& with,
                       std::vector<log::FlightLog>* keep) {
   progress("reading " + path);
-  auto log = read_studied(path);
+  auto log = read_studied(path, with.notes);
   if (!group.empty() && (!log.has(group) || log.column(group).empty()))
     throw Failure(kBadData, path + ":1: no column '" + group + "' to group flights by; name one that it has");
-  if (with.grid) refuse_below(path, log, *with.grid);
+  std::optional<study::MapShare> place;
+  if (with.grid) {
+    place = study::map_share(log, *with.grid, with.vehicle);
+    with.notes.place(path, *place);
+  }
   study::Observer observer(with.vehicle, with.surroundings);
   observer.add(log);
-  StudiedFlight flight{path, group.empty() ? 0 : log.column(group).front(), log::FlightMark(log), observer.take()};
+  StudiedFlight flight{path, group.empty() ? 0 : log.column(group).front(), log::FlightMark(log), observer.take(),
+                       place};
   if (keep) keep->push_back(std::move(log));
   return flight;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "core/study/windows/observed.hpp"
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
+#include "services/backwash/learn/log_notes.hpp"
 
 namespace backwash::services {
 
@@ -20,9 +22,9 @@ bool is_autopilots_log(const std::string& path);
 /// A flight log: ULog (.ulg) or DataFlash (.bin) by its name, else CSV. Throws Failure.
 log::FlightLog read_flight(const std::string& path);
 
-/// The same for a study, which needs positions: without the columns of sensors that never spoke. A table that no flight
-/// can be (core/log, impossible()) is refused. Throws Failure.
-log::FlightLog read_studied(const std::string& path);
+/// The same for a study, which needs positions: without the columns of sensors that never spoke, and without those of a
+/// table that the others contradict (core/log, leave_out_doubted()), which `notes` then tell. Throws Failure.
+log::FlightLog read_studied(const std::string& path, LogNotes& notes);
 
 /// What flights are looked at with. Nothing here outlives the study.
 struct LookedWith {
@@ -30,6 +32,7 @@ struct LookedWith {
   const Model& model;
   const map::OccupancyGrid* grid;  ///< may be null
   study::MapView& surroundings;    ///< of the two
+  LogNotes& notes;
 };
 
 /// What a study keeps of one log.
@@ -38,8 +41,10 @@ struct StudiedFlight {
   double group = 0;  ///< value of the column that flights are grouped by in the first row
   log::FlightMark mark;
   study::Observed observed;
+  std::optional<study::MapShare> place = {};  ///< with a map
 };
-/// Reads a log and looks at it. `group`: a column, or empty. `keep`: takes the log. Throws Failure.
+/// Reads a log and looks at it. `group`: a column, or empty. `keep`: takes the log. Throws Failure, also where too much
+/// of the flight lies where the map lets no craft be.
 StudiedFlight look_at(const std::string& path, const std::string& group, const LookedWith& with,
                       std::vector<log::FlightLog>* keep);
 

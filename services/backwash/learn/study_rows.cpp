@@ -43,7 +43,12 @@ StudiedFlight flight_of(const Json& row) {
     throw std::out_of_range("windows");
   std::vector<std::size_t> hashes(positions->size() / sizeof(std::size_t));
   if (!hashes.empty()) std::memcpy(hashes.data(), positions->data(), positions->size());
-  return {row.at("log"), row.at("group"), log::FlightMark(std::move(hashes)), std::move(*observed)};
+  StudiedFlight flight{row.at("log"), row.at("group"), log::FlightMark(std::move(hashes)), std::move(*observed)};
+  if (row.contains("map_share")) {
+    const Json& share = row["map_share"];
+    flight.place = {share.at("inside"), share.at("too_near"), share.at("outside")};
+  }
+  return flight;
 }
 
 }  // namespace
@@ -52,6 +57,8 @@ std::string study_row(const StudiedFlight& flight, const RowsOf& of) {
   Json row{{"log", flight.path}, {"log_sha256", sha256_of_file(flight.path)}};
   row["made"] = made_with(of);
   row["group"] = flight.group;
+  if (const auto& place = flight.place)
+    row["map_share"] = {{"inside", place->inside}, {"too_near", place->too_near}, {"outside", place->outside}};
   row["positions"] = files::base64(bytes_of(flight.mark.positions()));
   row["windows"] = files::base64(study::packed(flight.observed));
   try {

@@ -2,6 +2,8 @@
 #include "services/backwash/plan/vehicle_fit.hpp"
 
 #include <cstdio>
+#include <deque>
+#include <set>
 
 #include "core/study/loop/loop_fit.hpp"
 #include "core/types/formatted.hpp"
@@ -57,16 +59,17 @@ std::string toml_line(const LoopFit& fit, const char* key, LoopKey one, std::opt
                    fit.keys[*other]->value, interval(one).c_str(), interval(*other).c_str());
 }
 
-std::string proposal(const LoopFit& fit, const VehicleFitOptions& options) {
+std::string proposal(const LoopFit& fit, const std::string& vehicle, const std::vector<LoopLog>& logs) {
   std::string text = "# Proposed by backwash vehicle fit " + std::string(kVersion) +
-                     ", 90 % intervals behind each key, for " + options.vehicle + ":\n";
-  for (const auto& log : options.logs) text += "# " + log + "\n";
+                     ", 90 % intervals behind each key, for " + vehicle + ":\n";
+  for (const auto& log : logs) text += "# " + log.name + "\n";
   return text + "[controller]\n" + toml_line(fit, "kp", kKpLevel, kKpUp) + toml_line(fit, "kd", kKdLevel, kKdUp) +
          toml_line(fit, "latency", kLatency) + toml_line(fit, "attitude_lag", kLag);
 }
 
-Json to_json(const LoopFit& fit, const VehicleFitOptions& options, const Vehicle& vehicle) {
-  Json keys = Json::object(), unexcited = Json::array();
+Json to_json(const LoopFit& fit, const std::vector<LoopLog>& logs, const Vehicle& vehicle) {
+  Json keys = Json::object(), unexcited = Json::array(), names = Json::array();
+  for (const auto& log : logs) names.push_back(log.name);
   for (std::size_t k = 0; k < kLoopKeys; ++k) {
     const auto key = static_cast<LoopKey>(k);
     if (const auto& e = fit.keys[k])
@@ -75,7 +78,7 @@ Json to_json(const LoopFit& fit, const VehicleFitOptions& options, const Vehicle
   }
   for (const auto& u : fit.unexcited)
     unexcited.push_back({{"log", u.log}, {"key", std::string(name_of(u.key))}, {"flight", remedy(u.key)}});
-  return {{"logs", options.logs},
+  return {{"logs", std::move(names)},
           {"windows", fit.windows},
           {"level_by", fit.by_attitude ? "attitude" : "position"},
           {"vertical_by", fit.by_thrust ? "thrust" : "position"},
@@ -97,25 +100,52 @@ void print_text(const LoopFit& fit, const Vehicle& vehicle) {
   }
 }
 
+/// Fits without the logs that tell nothing of any loop, such as one of some seconds, and, where enough are left,
+/// without those that do not excite a key: takes them out of `named`. Throws Failure 65 with the first that was left
+/// out, where fewer than kFewest are left.
+LoopFit fit_those_that_tell(std::vector<LoopLog>& named, const Vehicle& vehicle, LogNotes& notes) {
+  const auto leave_out = [&](const std::string& log, const std::string& why) {
+    if (std::erase_if(named, [&](const LoopLog& one) { return one.name == log; }) > 0) notes.left_out(log, why);
+  };
+  while (named.size() >= kFewest) {
+    auto fit = fit_loop(named, vehicle);
+    if (!fit) {
+      leave_out(fit.error().log, fit.error().log + ":1: " + fit.error().what);
+      continue;
+    }
+    std::set<std::string> dull;
+    for (const auto& u : fit->unexcited) dull.insert(u.log);
+    if (dull.empty() || named.size() < kFewest + dull.size()) return std::move(*fit);
+    for (const auto& log : dull) {
+      auto of = fit->unexcited;
+      std::erase_if(of, [&](const UnexcitedLoop& u) { return u.log != log; });
+      leave_out(log, unexcited_line(of));
+    }
+  }
+  throw Failure(kBadData, notes.logs.front().second + "; of the " + std::to_string(kFewest) + " logs that are needed " +
+                              std::to_string(named.size()) + " are left");
+}
+
 int fit_vehicle(const VehicleFitOptions& options) {
   check_output(options.out, options.force);
   const auto vehicle = read_vehicle(options.vehicle);
   if (options.logs.size() < kFewest)
     throw Failure(kUsage, "give three logs or more, of flights that differ: " + std::to_string(options.logs.size()) +
                               " cannot say by how much flights do");
-  std::vector<log::FlightLog> logs;
+  std::deque<log::FlightLog> logs;
   std::vector<LoopLog> named;
-  for (const auto& path : options.logs) {
+  LogNotes notes{"backwash vehicle fit", {}, {}, {}};
+  each_readable(options.logs, notes, [&](const std::string& path) {
     progress("reading " + path);
-    logs.push_back(read_studied(path));
-  }
-  for (std::size_t n = 0; n < logs.size(); ++n) named.push_back({options.logs[n], &logs[n]});
+    logs.push_back(read_studied(path, notes));
+    named.push_back({path, &logs.back()});
+  });
   progress("fitting the loop");
-  const auto fit = fit_loop(named, vehicle);
-  if (!fit) throw Failure(kBadData, fit.error().log + ":1: " + fit.error().what);
-  if (!options.out.empty() && fit->unexcited.empty()) write_file(options.out, proposal(*fit, options), options.force);
-  options.json ? print(to_json(*fit, options, vehicle)) : print_text(*fit, vehicle);
-  if (!fit->unexcited.empty()) throw Failure(kBadData, unexcited_line(fit->unexcited));
+  const auto fit = fit_those_that_tell(named, vehicle, notes);
+  if (!options.out.empty() && fit.unexcited.empty())
+    write_file(options.out, proposal(fit, options.vehicle, named), options.force);
+  options.json ? print(told_first(notes, to_json(fit, named, vehicle))) : print_text(fit, vehicle);
+  if (!fit.unexcited.empty()) throw Failure(kBadData, unexcited_line(fit.unexcited));
   if (!options.out.empty() && !options.json) std::printf("proposal written to %s\n", options.out.c_str());
   return kOk;
 }

@@ -217,7 +217,10 @@ tl::expected<std::string, log::LogError> proposed_column_map(const std::string& 
         for (const char c : std::string(kind.empty() ? "" : "xyz"))
           map.columns[filled(kind, c)] = {found.at(std::string("acceleration_") + c), unit};
         const auto flight = log::import_unchecked(table, map);
-        const auto wrong = flight ? log::contradictions(*flight) : std::vector<std::string>{flight.error().message};
+        std::vector<std::string> wrong;
+        if (!flight) wrong.push_back(flight.error().message);
+        if (flight)
+          for (const auto& doubt : log::contradictions(*flight)) wrong.push_back(doubt.words);
         if (!doubts || wrong.size() < doubts->size()) {
           best = map;
           doubts = wrong;

@@ -206,6 +206,24 @@ TEST_F(Gates, CountFrozenPerchedAndSaturatedWindowsOnceEach) {
   EXPECT_EQ(flight.windows.size(), 13u);
 }
 
+TEST_F(Gates, JudgeWhoStandsByTheLogsOwnThrustAndNoFilesWeight) {
+  Vehicle heavy = five_inch();
+  heavy.propulsion.max_thrust /= 4;  // or a thrust stand's figure of one rotor
+  const auto hovering = flight_windows(log_, heavy, {}, "log.csv");
+  ASSERT_TRUE(hovering);
+  EXPECT_EQ(count(*hovering, Gate::perched), 0u);
+  // Lands in mid log, the rotors on; stands longer than it flies.
+  for (std::size_t k = 350; k < log_.t_s.size() - 400; ++k)
+    log_.columns["thrust"][k] = 0.12 + 0.01 * std::sin(0.1 * static_cast<double>(k));
+  const auto landed = flight_windows(log_, heavy, {}, "log.csv");
+  ASSERT_TRUE(landed);
+  EXPECT_GE(count(*landed, Gate::perched), 11u);
+  EXPECT_GE(landed->windows.size(), 5u);
+  // A rotor at its limit now and then is no hover.
+  for (std::size_t k = 0; k < log_.t_s.size(); k += 60) log_.columns["thrust"][k] = 1;
+  EXPECT_GE(count(cut(), Gate::perched), 11u);
+}
+
 TEST_F(Gates, KeepWhatIsWrongOutOfTheWindowsBesideIt) {
   const auto clean = cut();
   change(9, [&](std::size_t k) {

@@ -8,7 +8,7 @@ namespace backwash::study {
 /// Why a window was left out.
 enum class Gate : std::size_t {
   frozen,        ///< measurements repeat themselves: a tracker or estimator that has stopped
-  perched,       ///< standing on something: no motion at all, thrust far below the weight, or rotors told to rest
+  perched,       ///< standing on something: no motion at all, thrust far below the log's hover, or rotors told to rest
   saturated,     ///< rotors at a limit: the acceleration is then not the command's and the air's alone
   transit,       ///< on the way between hover positions, or settling after it
   gap,           ///< rows are missing

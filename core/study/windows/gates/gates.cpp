@@ -64,7 +64,32 @@ LogGates::LogGates(const log::FlightLog& log, std::vector<std::size_t> rows, con
   for (const char* name : {"motor1", "motor2", "motor3", "motor4"})
     if (log.has(name)) motors_.push_back(&log.column(name));
   commands_ = motors_;
-  if (log.has("thrust")) commands_.push_back(&log.column("thrust"));
+  if (!log.has("thrust")) return;
+  commands_.push_back(&log.column("thrust"));
+  hover_thrust_ = hover_thrust();
+}
+
+double LogGates::share_of(double u) const { return vehicle_ ? thrust_share(*vehicle_, u) : u; }
+
+/// What the log itself holds in the air: the median of all that is no less than perched_thrust of it. It is looked for
+/// from the mean of the shares by their own size on: a log that mostly stands is judged by what it does off the ground.
+std::optional<double> LogGates::hover_thrust() const {
+  std::vector<double> shares;
+  double sum = 0, squares = 0;
+  for (const auto row : rows_) {
+    shares.push_back(share_of(log_.column("thrust")[row]));
+    sum += shares.back();
+    squares += shares.back() * shares.back();
+  }
+  if (!(sum > 0)) return std::nullopt;
+  for (double held = squares / sum;;) {
+    std::vector<double> flown;
+    for (const double share : shares)
+      if (share >= options_.perched_thrust * held) flown.push_back(share);
+    const double next = quantile(std::move(flown), 0.5);
+    if (next == held) return held;
+    held = next;
+  }
 }
 
 bool LogGates::rotors_rest(SampleRange w) const {
@@ -89,11 +114,9 @@ bool LogGates::perched(SampleRange w) const {
     most = std::max(most, mean([&](std::size_t row) { return std::pow(x[row] - middle, 2); }));
   }
   if (std::sqrt(most) < options_.perched_m || rotors_rest(w)) return true;
-  if (log_.has("thrust") && vehicle_) {
+  if (hover_thrust_) {
     const auto& u = log_.column("thrust");
-    const double thrust =
-        vehicle_->propulsion.max_thrust * mean([&](std::size_t row) { return thrust_share(*vehicle_, u[row]); });
-    if (thrust < options_.perched_thrust * vehicle_->body.mass * kGravity) return true;
+    if (mean([&](std::size_t row) { return share_of(u[row]); }) < options_.perched_thrust * *hover_thrust_) return true;
   }
   if (!log_.has("stood_z_m")) return false;
   const auto &z = log_.column("z_m"), &stood = log_.column("stood_z_m");

@@ -23,18 +23,22 @@ class LogGates {
            const WindowOptions& options);
 
   /// Why a window is left out, the first that holds: frozen (the position repeats in some of its rows); perched (no
-  /// motion, mean thrust far below the weight, rotors told to rest in some row, or hardly above `stood_z_m`, where a
-  /// recording says that it stood); saturated (a rotor command at either end). Nothing if it is good. O(rows of w).
+  /// motion, mean thrust far below what this log holds in the air, rotors told to rest in some row, or hardly above
+  /// `stood_z_m`, where a recording says that it stood); saturated (a rotor command at either end). Nothing if it is
+  /// good. O(rows of w).
   std::optional<Gate> operator()(SampleRange w) const;
 
  private:
   bool perched(SampleRange w) const;
   bool rotors_rest(SampleRange w) const;
+  double share_of(double u) const;
+  std::optional<double> hover_thrust() const;
 
   const log::FlightLog& log_;
   std::vector<std::size_t> rows_;
   std::optional<Vehicle> vehicle_;
   WindowOptions options_;
+  std::optional<double> hover_thrust_;                // the log's own, as thrust_share; without thrust none
   std::vector<char> frozen_;                          // per row
   std::vector<const std::vector<double>*> motors_;    // those that are logged
   std::vector<const std::vector<double>*> commands_;  // and the collective

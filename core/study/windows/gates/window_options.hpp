@@ -16,7 +16,7 @@ struct WindowOptions {
   double gap_s = kWindowRules.gap, gap_periods = kWindowRules.gap_periods;  ///< rows farther apart than both are a gap
   double frozen_s = kWindowRules.frozen;  ///< a position repeated over so long, in frozen_rows or more, has stopped
   double perched_m = kWindowRules.perched_spread;  ///< largest standard deviation of the position of one that stands
-  double perched_thrust = kWindowRules.perched_thrust;  ///< of the weight, mean over a window
+  double perched_thrust = kWindowRules.perched_thrust;  ///< of the log's hover thrust, mean over a window
   double idle = kWindowRules.idle;          ///< of the full command: with all rotors below in some row it stands
   double clear_m = kWindowRules.clear;      ///< above where a recording says that it stood
   double limit = kWindowRules.rotor_limit;  ///< of the full command: a rotor so near to either end is at its limit

@@ -32,8 +32,8 @@ struct WindowRules {
   Rule perched_spread{"perched_spread", 0.0003, "m",
                       "measured: halved and doubled no window of the recordings changes "
                       "(docs/measurements/window_rules.md); hovers move by 10 mm"};
-  Rule perched_thrust{"perched_thrust", 0.6, "of the weight",
-                      "derived: below every hover, of a thrust curve that may be 30 % off"};
+  Rule perched_thrust{"perched_thrust", 0.6, "of the log's hover thrust",
+                      "derived: below every hover, of a thrust curve that may be 30 % off; no file's weight or thrust"};
   Rule idle{"idle", 0.05, "of the full command",
             "measured: halved and doubled no window of the recordings changes (docs/measurements/window_rules.md)"};
   Rule clear{
@@ -107,6 +107,8 @@ struct WindowRules {
   Rule offset_step{"offset_step", 0.1, "m", "derived: the voxel of the maps that are shipped"};
   Rule points_along{"points_along", 7, "1", "chosen: places along a window; at 1 m/s they are 0.3 m apart"};
   Rule sight{"sight", 3, "m", "derived: e^-5 is left of an effect of the longest length searched, 0.6 m"};
+  Rule misplaced{"misplaced", 0.02, "of a flight's samples",
+                 "chosen: of 80 s, those of 1.6 s: a touch, or a landing beside the map; a wrong map takes more"};
   Rule sight_up{"sight_up", 20, "m", "derived: surfaces below and above, in rooms higher than any that was flown"};
   Rule room{"room", 1e5, "m", "derived: without a map, no flight is so far from its origin"};
   Rule sigma_lattice{"sigma_lattice", 0.15, "m", "chosen: Σ is evaluated so far apart and ln Σ interpolated"};
