@@ -16,13 +16,13 @@ shown() {
   daemon_pid=''
   sed "s/^/$1, $2: /" "$work/seen"
 }
-# sent NAME PLACE: at this place, while odometry came at 5 to 10.5 a second (10, from when they found each other on).
+# sent NAME PLACE: at this place, while odometry came 10 times a second (8 to 11 between the first and the last).
 sent() {
   python3 - "$work/seen" "$1" "$2" "$3" <<'PYTHON' || die "$1 is not $2, $3: $(<"$work/seen")"
 import re, sys
 lines = dict(line.rstrip().split(": ", 1) for line in open(sys.argv[1]))
 place, rate, after, newest, oldest = re.fullmatch(r"(.*), ([\d.]+) a second, (\d+) after it, (\S+) to (\S+) s old", lines[sys.argv[2]]).groups()
-assert place == sys.argv[3] and 5 <= float(rate) <= 10.5, (place, rate)
+assert place == sys.argv[3] and 8 <= float(rate) <= 11, (place, rate)
 assert (int(after) > 10) == (sys.argv[4] == "goes on") and int(after) <= (25 if sys.argv[4] == "goes on" else 3), after
 assert -0.05 <= float(newest) and float(oldest) < 0.5, (newest, oldest)
 PYTHON

@@ -2,10 +2,11 @@
 // An estimator and a tf2 listener in one, through Fast DDS with types written by hand, for
 // tests/system/daemon_transforms.sh.
 //   fastdds_transforms DOMAIN map|odom|closure SECONDS
-// Sends the pose of a vehicle at rest for so long: in frame map; in frame odom, whose place in the map is on
-// rt/backwash/loop_closure; or that place alone. After it has ended it listens for as long as kAfter. Of each transform
-// on rt/tf, reliable and volatile as tf2 asks for it, a line: "FRAME > CHILD: X Y Z yaw ANGLE, N a second, M after it,
-// NEWEST to OLDEST s old".
+// Sends the pose of a vehicle at rest until SECONDS after the first transform, or for kFound if none comes: in frame
+// map; in frame odom, whose place in the map is on rt/backwash/loop_closure; or that place alone. After it has ended it
+// listens for as long as kAfter. Of each transform on rt/tf, reliable and volatile as tf2 asks for it, a line: "FRAME >
+// CHILD: X Y Z yaw ANGLE, N a second, M after it, NEWEST to OLDEST s old"; N from the first to the last while poses
+// were sent: how long the processes took to find each other is no part of it.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -20,7 +21,7 @@
 
 namespace {
 
-constexpr int kAfter = 2;  // s
+constexpr int kAfter = 2, kFound = 8;  // s
 // Of the vehicle in what the estimator calls its frame, and of odom in the map: x, y, z in m, yaw in rad.
 struct Place {
   double x, y, z, yaw;
@@ -100,6 +101,7 @@ class TfType : public Type {
 struct Seen {
   Transform last;
   int during = 0, after = 0;
+  double first = 0, latest = 0;        // s, arrival while poses were sent
   double oldest = -1e9, newest = 1e9;  // s
 };
 
@@ -132,15 +134,19 @@ int main(int argc, char** argv) {
   if (what != "map") closure->write(&map);
   std::map<std::string, Seen> seen;
   auto due = std::chrono::steady_clock::now();
-  for (int n = 0; n < 100 * (seconds + kAfter); ++n) {
-    const bool during = n < 100 * seconds;
+  int until = 100 * kFound;
+  for (int n = 0; n < until + 100 * kAfter; ++n) {
+    const bool during = n < until;
     if (during && what != "closure") odometry->write(&what);
     std::vector<Transform> message;
     fast::SampleInfo info;
     while (tf->take_next_sample(&message, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK)
       for (const Transform& t : message) {
+        if (seen.empty()) until = std::min(until, n + 100 * seconds);
         Seen& s = seen[t.frame + " > " + t.child];
         s.last = t;
+        if (during) s.latest = now(std::chrono::steady_clock());
+        if (s.during == 0) s.first = s.latest;
         ++(during ? s.during : s.after);
         s.oldest = std::max(s.oldest, t.age);
         s.newest = std::min(s.newest, t.age);
@@ -150,7 +156,7 @@ int main(int argc, char** argv) {
   }
   for (const auto& [name, s] : seen)
     std::printf("%s: %.3f %.3f %.3f yaw %.3f, %.1f a second, %d after it, %.1f to %.1f s old\n", name.c_str(),
-                s.last.at.x, s.last.at.y, s.last.at.z, s.last.at.yaw, double(s.during) / seconds, s.after, s.newest,
-                s.oldest);
+                s.last.at.x, s.last.at.y, s.last.at.z, s.last.at.yaw,
+                (s.during - 1) / std::max(1e-3, s.latest - s.first), s.after, s.newest, s.oldest);
   return 0;
 }
