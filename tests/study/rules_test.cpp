@@ -117,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(OfARoom, NoConstant,
 /// end its file, or of a spectrum; bins that are told; counts of gates and of shifted set-points; heights of a way.
 bool is_an_entry(const std::string& line) {
   static const std::regex entry(
-      "\\.(least|floor|possible|scales) = |scales_of\\(|k(Wall|Height)Edges\\[\\] =|kHoverGates =|kShapes|kOwn "
+      "\\.(least|floor|priors|scales) = |scales_of\\(|k(Wall|Height)Edges\\[\\] =|kHoverGates =|kShapes|kOwn "
       "=|double height : \\{|"
       "motors_\\.size\\(\\) < 4");
   return std::regex_search(line, entry);
@@ -194,7 +194,7 @@ TEST(Effects, EveryFormSaysWhatItAddsAndFromWhichSizeOnItIsAnEffect) {
   for (const Form* f : catalogue()) {
     EXPECT_TRUE(formulas.insert(f->formula).second) << f->cause() << ": two forms with the same formula";
     EXPECT_FALSE(f->parameters.empty()) << f->formula;
-    EXPECT_EQ(f->possible.size(), f->parameters.size()) << f->formula << ": not each parameter says what is possible";
+    EXPECT_EQ(f->priors.size(), f->parameters.size()) << f->formula << ": not each parameter has a typical size";
     EXPECT_TRUE(f->columns) << f->formula;
     EXPECT_GT(f->floor + f->least, 0) << f->formula << ": neither floor nor least";
     EXPECT_EQ(f->scale_name.empty(), f->scales.size() == 1) << f->formula;

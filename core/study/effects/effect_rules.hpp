@@ -6,7 +6,7 @@
 namespace backwash::study {
 
 /// Every constant that effects share and that decides what they explain (`backwash study --rules`). Members are rules
-/// and nothing else. What a single form alone has (floor, least, possible, scales, reference) is in its file, under
+/// and nothing else. What a single form alone has (floor, least, priors, scales, reference) is in its file, under
 /// these names.
 struct EffectRules {
   // Surfaces and the place of a window

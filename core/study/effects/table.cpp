@@ -2,6 +2,7 @@
 #include "core/study/effects/table.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace backwash::study {
 
@@ -20,6 +21,12 @@ constexpr Effect (*kEffects[])() = {
 }  // namespace
 
 const std::string& Form::cause() const { return effect->name; }
+
+double Form::prior_nats(std::span<const double> sizes) const {
+  double square = 0;
+  for (std::size_t k = 0; k < priors.size(); ++k) square += std::pow(sizes[k] / priors[k].typical, 2);
+  return 0.5 * static_cast<double>(priors.size() + 1) * std::log1p(square);
+}
 
 std::vector<Scale> scales_of(std::initializer_list<double> values) {
   std::vector<Scale> scales;

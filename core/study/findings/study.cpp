@@ -306,7 +306,8 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
       for (const auto& signs : draws) {
         for (std::size_t f = 0; f < injected.b.size(); ++f)
           injected.b[f] = signs[f] * c.normal.b[f] + size * c.normal.A[f].col(0);
-        if (injected.gain() >= threshold && c.effect(injected.fit())) ++found;
+        const SmallVector fit = injected.fit();
+        if (injected.gain() - c.prior_nats(fit) >= threshold && c.effect(fit)) ++found;
       }
       return static_cast<double>(found) / kFlips;
     };

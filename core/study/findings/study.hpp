@@ -54,7 +54,7 @@ struct StudyResult {
   StudyVerdict verdict = StudyVerdict::nothing_found;
   std::vector<NamedCause> causes{};
   std::vector<UnknownStructure> unknown{};
-  std::vector<Refused> refused{};  ///< causes that would have led, but for a size that no vehicle can have
+  std::vector<Refused> refused{};  ///< causes that would have led, but for a size that their laws cannot have
   std::vector<std::pair<std::string, std::string>> not_tested{};  ///< name, why
   /// Per cause and parameter: least size found with 80 % power.
   std::map<std::string, std::map<std::string, double>> minimum_detectable{};

@@ -142,6 +142,7 @@ std::string figures(const NamedCause& cause, const PageContext& context) {
   if (context.read_vehicle) text += row("What to change", remedy_of(cause, *context.read_vehicle).words);
   for (const auto& e : cause.found.parameters)
     text += row(spoken(e.name), number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
+  text += row("The size", beforehand(cause.found));
   if (!cause.extrapolated.empty()) text += row("The size is extrapolated", cause.extrapolated);
   text += row("Probability of as much by chance, over everything tried", number(cause.found.p));
   text += row("Gain on flights not fitted", number(g.held_out_nats) + " nats  [" + number(g.low_nats) + ", " +

@@ -57,8 +57,15 @@ std::string extrapolated(const Accepted& cause, const Observations& seen) {
 }
 
 std::string refusal(const Refused& r) {
-  return spoken(r.name) + " would have to be " + number(r.value) + " (" + r.parameter + "), possible are " +
-         number(r.possible.least) + " to " + number(r.possible.most) + ": " + r.possible.reason;
+  return spoken(r.name) + " would have to be " + number(r.value) + " (" + r.parameter + "), its law has " +
+         number(r.least) + " to " + number(r.most) + ": " + r.reason;
+}
+
+std::string beforehand(const Accepted& cause) {
+  double most = 0;
+  for (std::size_t k = 0; k < cause.form->priors.size(); ++k)
+    most = std::max(most, std::abs(cause.theta[static_cast<Eigen::Index>(k)]) / cause.form->priors[k].typical);
+  return number(most) + " times what is typical: " + odds(-prior_nats_of(cause)) + " beforehand";
 }
 
 std::optional<double> clearance_cost(const Consequence& c) {

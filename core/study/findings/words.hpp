@@ -26,8 +26,11 @@ std::string extrapolated(const Accepted& cause, const Observations& seen);
 /// Largest |Σ θ x| over the flown windows of the cause's first channel, in that channel's unit (m/s² or ln).
 double largest_flown(const Accepted& cause, const Observations& seen);
 
-/// "ground_thrust would have to be 172 A_mps2 (possible: -3 to 3): …".
+/// "rotor drag would have to be -0.2 (k, 1/s), its law has 0 to inf: drag brakes".
 std::string refusal(const Refused& refused);
+/// "40 times what is typical: 1 to 1600 beforehand", however small. The parameter that is farthest from its typical
+/// size is told.
+std::string beforehand(const Accepted& cause);
 
 /// Clearance that the causes take from the same plan, m: before less after. Nothing unless both plans are ok.
 std::optional<double> clearance_cost(const Consequence& consequence);

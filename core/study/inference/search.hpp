@@ -45,6 +45,9 @@ struct Accepted {
   std::vector<Rival> rivals;
 };
 
+/// What the size of a cause costs beforehand, nats (Form::prior_nats).
+double prior_nats_of(const Accepted& cause);
+
 struct UnknownStructure {
   std::string along;           ///< regressor; two, "x_m, y_m", if their products are meant
   std::string group;           ///< channels: "mean x, y", "mean z", "ln variance"
@@ -54,11 +57,11 @@ struct UnknownStructure {
   std::optional<double> hz;    ///< of a tone
 };
 
-/// A cause that would have led, but for a size that no vehicle can have.
+/// A cause that would have led, but for a size that its law cannot have.
 struct Refused {
   std::string name, form, parameter;
-  double value;
-  Possible possible;
+  double value, least, most;
+  std::string reason;
 };
 
 struct CauseSearchResult {

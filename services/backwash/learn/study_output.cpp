@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwash/learn/study_output.hpp"
 
+#include <cmath>
 #include <cstdio>
 
 #include "core/study/calibrate/calibration_rules.hpp"
@@ -30,6 +31,12 @@ Json to_json(const std::vector<study::ActingFlight>& flights, const std::vector<
     all.push_back(one);
   }
   return all;
+}
+
+/// Two ends of a range; null: none.
+Json ends(double least, double most) {
+  const auto end = [](double at) { return std::isfinite(at) ? Json(at) : Json(); };
+  return Json::array({end(least), end(most)});
 }
 
 Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::vector<std::string>& logs) {
@@ -70,6 +77,7 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
                  {"ci95", {cause.shift.low, cause.shift.high}},
                  {"refuted", cause.shift.refuted()}}},
                {"extrapolated", cause.extrapolated},
+               {"beforehand", {{"nats", -study::prior_nats_of(found)}, {"words", study::beforehand(found)}}},
                {"largest_flown", cause.largest_flown},
                {"odds", study::odds(g.held_out_nats)},
                {"change", to_json(study::remedy_of(cause, vehicle))},
@@ -127,8 +135,8 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
                                {"form", r.form},
                                {"parameter", r.parameter},
                                {"value", r.value},
-                               {"possible", {r.possible.least, r.possible.most}},
-                               {"why", r.possible.reason}});
+                               {"possible", ends(r.least, r.most)},
+                               {"why", r.reason}});
   for (const auto& u : result.unknown)
     json["unknown"].push_back({{"along", u.along},
                                {"of", u.group},
@@ -206,6 +214,7 @@ void print_text(const study::NamedCause& cause, const Vehicle& vehicle, const st
         cause.shift.slope, cause.shift.low, cause.shift.high);
   for (const auto& e : cause.found.parameters)
     std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
+  std::printf("  size: %s\n", study::beforehand(cause.found).c_str());
   if (!cause.extrapolated.empty()) std::printf("  extrapolated: %s\n", cause.extrapolated.c_str());
   std::printf("  what to change: %s\n", study::remedy_of(cause, vehicle).words.c_str());
   for (const auto& s : cause.separate_by) {
@@ -254,16 +263,19 @@ void print_rules(bool json) {
     for (const auto& r : all_rules())
       all["rules"].push_back({{"name", r.name}, {"value", r.value}, {"unit", r.unit}, {"reason", r.reason}});
     for (const study::Form* f : study::catalogue()) {
-      Json possible = Json::object();
-      for (std::size_t k = 0; k < f->possible.size(); ++k) {
-        const auto& p = f->possible[k];
-        possible[f->parameters[k]] = {{"range", {p.least, p.most}}, {"why", p.reason}};
+      Json priors = Json::object();
+      for (std::size_t k = 0; k < f->priors.size(); ++k) {
+        const auto& p = f->priors[k];
+        priors[f->parameters[k]] = {{"typical", p.typical.value},
+                                    {"rule", p.typical.name},
+                                    {"range", ends(p.least, p.most)},
+                                    {"why", p.reason}};
       }
       all["forms"].push_back({{"effect", f->cause()},
                               {"form", f->formula},
                               {"least_rms", f->floor},
                               {"least_parameter", f->least},
-                              {"possible", possible}});
+                              {"priors", priors}});
     }
     return print(all);
   }
@@ -273,11 +285,13 @@ void print_rules(bool json) {
   std::printf("\nleast root mean square over the flown windows, least first parameter, of each form:\n");
   for (const study::Form* f : study::catalogue())
     std::printf("%-20s %7.3g %7.3g  %s\n", f->cause().c_str(), f->floor, f->least, f->formula.c_str());
-  std::printf("\nsizes beyond which a cause is refused by name:\n");
+  std::printf("\ntypical size of each parameter, and ends of its law:\n");
   for (const study::Form* f : study::catalogue())
-    for (std::size_t k = 0; k < f->possible.size(); ++k)
-      std::printf("%-20s %-16s %6.3g to %.3g: %s\n", f->cause().c_str(), f->parameters[k].c_str(), f->possible[k].least,
-                  f->possible[k].most, f->possible[k].reason.c_str());
+    for (std::size_t k = 0; k < f->priors.size(); ++k) {
+      const auto& p = f->priors[k];
+      std::printf("%-20s %-16s %6.3g, %.3g to %.3g  %s\n", f->cause().c_str(), f->parameters[k].c_str(),
+                  p.typical.value, p.least, p.most, p.reason.c_str());
+    }
 }
 
 }  // namespace backwash::services
