@@ -10,6 +10,7 @@
 
 #include "core/study/calibrate/calibration_rules.hpp"
 #include "core/study/design/design_rules.hpp"
+#include "core/study/effects/columns.hpp"
 #include "core/study/effects/table.hpp"
 #include "core/study/findings/self_test.hpp"
 #include "core/study/inference/rules.hpp"
@@ -201,6 +202,26 @@ TEST(Effects, EveryFormSaysWhatItAddsAndFromWhichSizeOnItIsAnEffect) {
     EXPECT_EQ(f->effect->name, f->cause());
     for (const Form& shape : f->shapes) EXPECT_EQ(shape.parameters, f->parameters) << shape.formula;
   }
+}
+
+TEST(Effects, ThatNoFlightTellsAreRefusedByNameWhenTheCatalogueIsMade) {
+  const auto form = [](bool constant, auto columns) {
+    return Form{.formula = "made up", .parameters = {"B"}, .constant = constant, .columns = columns};
+  };
+  const auto factor = [](const Windows& ws, const Scale&) {
+    return std::vector{in_variance(ws, [](auto&) { return 1.0; })};
+  };
+  const auto push = [](const Windows& ws, const Scale&) {
+    return std::vector{level(ws, [](auto& w) -> Vec3 { return w.body_axis(1); })};
+  };
+  for (const bool constant : {false, true}) {
+    const auto why = stays_free(form(constant, factor));
+    ASSERT_TRUE(why) << "a constant factor on Σ is each craft's own level";
+    EXPECT_EQ(why->find("cannot be told: 'made up'"), 0u) << *why;
+  }
+  EXPECT_TRUE(stays_free(form(false, push)));
+  EXPECT_FALSE(stays_free(form(true, push))) << "trim claims the offset itself";
+  for (const Form* f : catalogue()) EXPECT_FALSE(stays_free(*f)) << f->formula;
 }
 
 }  // namespace
