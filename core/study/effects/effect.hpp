@@ -127,7 +127,14 @@ struct Form {
   std::function<std::vector<SimulationTerm>(const FittedForm&, const Observations&)> simulate = {};
   const Effect* effect = nullptr;  ///< whose form it is; set by the table
 
+  /// What words and figures say of a parameter by its fitted number, one for each, rising; empty: the number itself.
+  std::vector<double (*)(double fitted)> meanings = {};
+
   const std::string& cause() const;  ///< the effect's name
+  /// A fitted parameter, or an end of its interval, as its words say it.
+  double in_words(std::size_t parameter, double fitted) const {
+    return parameter < meanings.size() ? meanings[parameter](fitted) : fitted;
+  }
   /// Nats that sizes θ of its p parameters, typically s, cost beforehand: (p + 1)/2 ln(1 + Σ (θ/s)²), docs/model.md
   /// 8-3b. That is −ln of Cauchy's density over its value at 0: tails so heavy that what flights show plainly stands.
   double prior_nats(std::span<const double> sizes) const;

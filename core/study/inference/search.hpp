@@ -34,6 +34,12 @@ struct Rival {
   double behind_nats;  ///< gain of the accepted cause less the rival's
 };
 
+/// A flight, or what is left out with it: its share of the gain, nats, and θ without it.
+struct LeftOut {
+  double nats;
+  SmallVector theta;
+};
+
 struct Accepted {
   const Form* form;
   Scale scale;
@@ -43,6 +49,7 @@ struct Accepted {
   double gain;  ///< held out, nats, given the other accepted causes
   std::vector<Estimate> parameters;
   std::vector<Rival> rivals;
+  std::vector<LeftOut> flights = {};  ///< `gain` by flight; empty where none may be left out
 };
 
 /// What the size of a cause costs beforehand, nats (Form::prior_nats).

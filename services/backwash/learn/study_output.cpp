@@ -50,7 +50,12 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
     separate.push_back(
         {{"rival", s.rival}, {"manoeuvre", s.manoeuvre}, {"expected_nats", s.expected_nats.value_or(0)}});
   const auto& g = cause.gain;
-  const auto& a = cause.applied;
+  Json channels = Json::array();
+  for (const auto& c : g.channels)
+    channels.push_back({{"channel", study::channel_name(c.channel)},
+                        {"before", c.before},
+                        {"after", c.after},
+                        {"windows", c.windows}});
   Json json = {{"name", found.form->cause()},
                {"set", set},
                {"p", found.p},
@@ -62,20 +67,10 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
                  {"rmse_before", g.rmse_before},
                  {"rmse_after", g.rmse_after},
                  {"variance_coverage_before", g.coverage_before},
-                 {"variance_coverage_after", g.coverage_after}}},
-               {"applied",
-                {{"held_out_nats", a.nats},
-                 {"rmse_before", a.rmse_before},
-                 {"rmse_after", a.rmse_after},
-                 {"variance_coverage_before", a.coverage_before},
-                 {"variance_coverage_after", a.coverage_after},
-                 {"refused", a.refused}}},
-               {"hover_shift",
-                {{"predicted_m", cause.shift.predicted},
-                 {"measured_m", cause.shift.measured},
-                 {"slope", cause.shift.slope},
-                 {"ci95", {cause.shift.low, cause.shift.high}},
-                 {"refuted", cause.shift.refuted()}}},
+                 {"variance_coverage_after", g.coverage_after},
+                 {"channels", channels}}},
+               {"applied", {{"refused", cause.applied.refused}}},
+               {"positions", cause.positions},
                {"extrapolated", cause.extrapolated},
                {"beforehand", {{"nats", -study::prior_nats_of(found)}, {"words", study::beforehand(found)}}},
                {"largest_flown", cause.largest_flown},
@@ -86,6 +81,11 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
   json["where"] = study::where(cause);
   json["in_flights"] = to_json(cause.flights, logs);
   return json;
+}
+
+Json to_json(const study::SteadyAnswer::Axes& s) {
+  return {{"predicted_m", s.predicted}, {"measured_m", s.measured}, {"left", s.left},
+          {"ci95", {s.low, s.high}},    {"decay_per_s", s.rate},    {"told", s.matters() && s.told()}};
 }
 
 void print_text(const char* of, const study::calibrate::HeightEffect& h) {
@@ -129,6 +129,7 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
                {"minimum_detectable", Json::object()}};
   for (const auto& [gate, count] : seen.gated_out) json["gated_out"][study::to_string(gate)] = count;
   for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause, vehicle, logs));
+  json["steady_answer"] = {{"level", to_json(result.steady.axes[0])}, {"up", to_json(result.steady.axes[1])}};
   json["refused"] = Json::array();
   for (const auto& r : result.refused)
     json["refused"].push_back({{"name", r.name},
@@ -207,11 +208,9 @@ void print_text(const study::NamedCause& cause, const Vehicle& vehicle, const st
   for (const auto& f : cause.flights) std::printf(" %s", f.flight < logs.size() ? logs[f.flight].c_str() : "?");
   if (!cause.flights.empty()) std::printf("\n");
   if (!cause.applied.refused.empty()) std::printf("  does not join the model: %s\n", cause.applied.refused.c_str());
-  if (cause.shift.refuted())
-    std::printf(
-        "  the hovers refute its shift: %.2f [%.2f, %.2f] of what is predicted; if the loop has an integrator,\n"
-        "  set controller.velocity_integrator of the vehicle file\n",
-        cause.shift.slope, cause.shift.low, cause.shift.high);
+  for (const auto& c : cause.gain.channels)
+    std::printf("  %s: error %.4g before, %.4g after\n", study::channel_name(c.channel), c.before, c.after);
+  if (!cause.positions.empty()) std::printf("  positions refused: %s\n", cause.positions.c_str());
   for (const auto& e : cause.found.parameters)
     std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
   std::printf("  size: %s\n", study::beforehand(cause.found).c_str());
@@ -240,6 +239,8 @@ void print_text(const study::StudyResult& result, const study::Observations& see
   std::printf("%s: %zu flights, %zu windows\n", study::to_string(result.verdict), seen.flights, seen.windows.size());
   if (result.verdict == study::StudyVerdict::insufficient) std::printf("%s\n", study::too_few(seen).c_str());
   for (const auto& cause : result.causes) print_text(cause, vehicle, logs);
+  for (std::size_t k = 0; k < result.steady.axes.size(); ++k)
+    if (const auto text = study::steady_words(result.steady, k); !text.empty()) std::printf("%s\n", text.c_str());
   if (consequence) std::printf("%s\n", study::cost_sentence(*consequence).c_str());
   for (const auto& r : result.refused) std::printf("refused: %s\n", study::refusal(r).c_str());
   for (const auto& u : result.unknown)
