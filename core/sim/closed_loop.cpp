@@ -11,6 +11,10 @@ namespace {
 Vehicle later(Vehicle vehicle, std::span<const SimulationTerm> terms) {
   vehicle.controller.latency = std::max(0.0, vehicle.controller.latency + setpoint_delay(terms));
   vehicle.controller.attitude_lag = std::max(0.0, vehicle.controller.attitude_lag + more_attitude_lag(terms));
+  auto& c = vehicle.controller;
+  const auto least = least_integrator(terms, c.kd);
+  c.velocity_integrator.horizontal = std::max(c.velocity_integrator.horizontal, least.horizontal);
+  c.velocity_integrator.vertical = std::max(c.velocity_integrator.vertical, least.vertical);
   return vehicle;
 }
 

@@ -33,6 +33,7 @@ struct SimulationTerm {
     thrust_lag,           ///< τ s: thrust follows its command with a first-order lag
     setpoint_delay,       ///< τ s: set-points act later by this
     attitude_lag,         ///< τ s: the attitude follows its command with a lag that is longer by this
+    shift_decay,          ///< level, up 1/s: an integrator holds steady pushes off; their shifts decay at these rates
     // Sensors and rotors.
     sensor_drift_with_time,  ///< x, y, z m/s² per 100 s, and at t = 0: bias of the accelerometer along the heading's
                              ///< axes
@@ -70,6 +71,7 @@ inline constexpr TermRange kTime{0.1, 1000};    // s
 inline constexpr TermRange kShare{-0.9, 0.9};   // of the thrust
 inline constexpr TermRange kPart{0, 1};         // of readings
 inline constexpr TermRange kLag{0, 1};          // s
+inline constexpr TermRange kDecay{0, 1};        // 1/s
 inline constexpr TermRange kDelay{-0.3, 0.3};   // s
 inline constexpr TermRange kVolts{0.1, 1000};   // V
 inline constexpr TermRange kCelsius{-50, 150};  // °C
@@ -129,6 +131,7 @@ inline constexpr auto kSimulationKinds = [] {
       {Kind::thrust_lag, "thrust_lag", {kLag}},
       {Kind::setpoint_delay, "setpoint_delay", {kDelay}},
       {Kind::attitude_lag, "attitude_lag", {kDelay}},
+      {Kind::shift_decay, "shift_decay", {kDecay, kDecay}},
       {Kind::sensor_drift_with_time, "sensor_drift_with_time", {kPush, kPush, kPush, kPush, kPush, kPush}},
       {Kind::sensor_drift_with_temperature,
        "sensor_drift_with_temperature",

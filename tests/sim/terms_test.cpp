@@ -37,7 +37,8 @@ std::vector<double> all_that_is_simulated(const Terms& given) {
   AirTerms air(grid, given, 1);
   ThrustTerms thrust(given);
   Sensors sensors(five_inch(), given, {}, 1);
-  std::vector<double> all{setpoint_delay(given), more_attitude_lag(given)};
+  const auto ki = least_integrator(given, five_inch().controller.kd);
+  std::vector<double> all{setpoint_delay(given), more_attitude_lag(given), ki.horizontal, ki.vertical};
   const FlightInstant at{20, {2, 2, 0.5}, {0.6, -0.8, 0.3}, 0.5};
   const double acceleration = thrust.step(kGravity, 0, 15.0, 1e-3);
   for (int i = 0; i < 50; ++i) {
@@ -216,6 +217,24 @@ TEST(ThrustTermsOfAModel, TheAttitudeLagsLonger) {
   EXPECT_GT(as_filed, 0);
   EXPECT_LT(slower, 0.8 * as_filed);
   EXPECT_GT(slower, 0.3 * as_filed);
+}
+
+TEST(ShiftDecayOfAModel, IsTheRateAtWhichASteadyPushsShiftGoes) {
+  const auto grid = room();
+  Vehicle v = five_inch();
+  v.estimation.position = 0;
+  const double push = 0.4, rate = 0.2;
+  const auto shift_after = [&](const Terms& terms, int seconds) {
+    ClosedLoop loop(grid, v, {{2, 2, 1.5}, Vec3::Zero()}, 1, {.strength = 0, .terms = terms});
+    Setpoint stay;
+    stay.p_W = {2, 2, 1.5};
+    for (int i = 0; i < 1000 * seconds; ++i) loop.step(stay);
+    return loop.sample(stay, {}).truth.p_W.x() - 2;
+  };
+  const SimulationTerm pushed{Law::push, {push, 0, 0}}, decays{Kind::shift_decay, {rate, 0}};
+  EXPECT_NEAR(shift_after({pushed}, 12), push / v.controller.kp.horizontal, 0.002);
+  const double early = shift_after({pushed, decays}, 8), later = shift_after({pushed, decays}, 12);
+  EXPECT_NEAR(std::log(early / later) / 4, rate, 0.1 * rate);
 }
 
 TEST(SensorsOfAModel, DriftWithTimeAndTemperatureAlongTheHeading) {

@@ -11,6 +11,7 @@
 #include <random>
 
 #include "core/study/findings/when_it_acts.hpp"
+#include "core/study/findings/words.hpp"
 #include "core/study/inference/changes/divisions.hpp"
 #include "core/study/inference/rules.hpp"
 #include "core/study/windows/signals/distributions.hpp"
@@ -271,7 +272,7 @@ TEST(Changes, WhatActsInSomeFlightsDoesNotJoinTheModel) {
 }
 
 /// −1.23 was told of a rotor that reads 0.54 of its speed: ln 0.54², as if it were 0.54² − 1.
-TEST(Changes, TellSharesAsShares) {
+TEST(ItsWords, OfLogarithmsAreShares) {
   const auto form = [](const std::string& cause) {
     for (const Form* f : catalogue())
       if (f->cause() == cause && f->integer_scale) return f;
@@ -279,15 +280,17 @@ TEST(Changes, TellSharesAsShares) {
   };
   const Windows windows(3);
   Accepted rotor{}, weight{};
+  rotor.form = form("rotor_sensor_fault");
+  weight.form = form("payload");
   rotor.columns = form("rotor_sensor_fault")->columns(windows, Scale());
   weight.columns = form("payload")->columns(windows, Scale());
   rotor.parameters = {{"e", 2 * std::log(0.54), 2 * std::log(0.5), 0}, {"rotor", 3, 3, 3}};
-  rotor = tell_shares(rotor);
+  rotor = in_words(rotor);
   EXPECT_NEAR(rotor.parameters[0].value, 0.54 * 0.54 - 1, 1e-12);
   EXPECT_NEAR(rotor.parameters[0].low, -0.75, 1e-12);
   EXPECT_EQ(rotor.parameters[1].value, 3);
   weight.parameters = {{"m_first", std::log(1.2 / 0.8) / 2, 0, 0}, {"m_second", 0, 0, 0}, {"pairing", 2, 2, 2}};
-  weight = tell_shares(weight);
+  weight = in_words(weight);
   EXPECT_NEAR(weight.parameters[0].value, 0.2, 1e-12) << "(1 + m) and (1 - m) of the mean";
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Causes that look alike, sizes that no vehicle can have, and what an engineer is told to change.
+// Causes that look alike, large sizes and ends of laws, and what an engineer is told to change.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -175,32 +175,59 @@ TEST(Rivals, ThatGoTogetherAtMinus094AreOneSetHoweverStrong) {
   }
 }
 
-TEST(Plausible, EveryParameterHasLimitsWithAReason) {
+TEST(Plausible, EveryParameterHasATypicalSizeAndAReasonForEachEnd) {
   for (const Form* f : catalogue()) {
-    ASSERT_EQ(f->possible.size(), f->parameters.size()) << f->formula;
-    for (const Possible& p : f->possible) {
+    ASSERT_EQ(f->priors.size(), f->parameters.size()) << f->formula;
+    for (const Prior& p : f->priors) {
+      EXPECT_GT(p.typical, 0) << f->formula;
       EXPECT_LT(p.least, p.most) << f->formula;
-      EXPECT_FALSE(p.reason.empty()) << f->formula;
+      EXPECT_EQ(std::isfinite(p.least) || std::isfinite(p.most), !p.reason.empty()) << f->formula;
     }
   }
 }
 
-TEST(Plausible, ASizeThatNoVehicleCanHaveIsRefusedByName) {
+TEST(Plausible, ASizeCostsWhatCauchysDensityLosesAndNoMoreInOneDirectionThanInAnother) {
+  const auto density = [](double x) { return 1 / (1 + x * x); };
+  const Form &sag = form_of("battery_sag"), &draft = form_of("draft");
+  for (const double size : {0.3, -2.0, 40.0}) {
+    const double one[] = {size}, expected = -std::log(density(size / sag.priors[0].typical));
+    EXPECT_NEAR(sag.prior_nats(one), expected, 1e-12);
+    const double along[] = {size, 0}, across[] = {size * std::sqrt(0.5), -size * std::sqrt(0.5)};
+    EXPECT_NEAR(draft.prior_nats(along), draft.prior_nats(across), 1e-12);
+  }
+}
+
+/// What stands in the logs is a cause of this size and nothing else.
+StudyResult with_only(const std::string& cause, const std::vector<double>& size) {
   auto seen = quiet();
-  // What stands in the logs would be a push of 172 m/s² at the reference: flights in which nothing else would tell.
-  const auto columns = form_of("battery_sag").columns(seen.windows, {});
-  for (const auto& part : columns.front().parts)
-    for (std::size_t i = 0; i < part.x.size(); ++i) seen.y[part.channel][i] += 40 * part.x[i];
-  const auto result = studied(seen);
-  for (const auto& cause : result.causes)
-    for (std::size_t k = 0; k < cause.found.form->possible.size(); ++k)
-      EXPECT_TRUE(cause.found.form->displaces_map ||
-                  cause.found.form->possible[k].holds(cause.found.parameters[k].value))
-          << study_worlds::told(result) << ' ' << cause.found.parameters[k].value;
+  const auto columns = form_of(cause).columns(seen.windows, form_of(cause).scales.front());
+  for (std::size_t k = 0; k < size.size(); ++k)
+    for (const auto& part : columns[k].parts)
+      for (std::size_t i = 0; i < part.x.size(); ++i) seen.y[part.channel][i] += size[k] * part.x[i];
+  return studied(seen);
+}
+
+TEST(Plausible, WhatFlightsShowPlainlyIsToldHoweverLargeAndAsLarge) {
+  const std::vector<std::pair<std::string, std::vector<double>>> sizes = {
+      {"draft", {-7, 4}}, {"trim", {5, 5}}, {"thrust_slope", {4}}, {"battery_sag", {40}}, {"payload", {0.62}}};
+  for (const auto& [cause, size] : sizes) {
+    const auto result = with_only(cause, size);
+    ASSERT_EQ(result.causes.size(), 1u) << cause << ": " << study_worlds::told(result);
+    const Accepted& found = result.causes.front().found;
+    EXPECT_EQ(found.form->cause(), cause) << study_worlds::told(result);
+    EXPECT_NEAR(found.theta[0], size[0], 0.1 * std::abs(size[0])) << cause;
+    EXPECT_GT(prior_nats_of(found), std::log(10)) << cause;
+    EXPECT_NE(beforehand(found).find(" times what is typical: 1 to "), std::string::npos) << beforehand(found);
+  }
+}
+
+TEST(Plausible, BeyondTheEndOfItsLawACauseIsRefusedByName) {
+  const auto result = with_only("payload", {1.3});
+  for (const auto& cause : result.causes) EXPECT_NE(cause.found.form->cause(), "payload") << study_worlds::told(result);
   ASSERT_FALSE(result.refused.empty()) << study_worlds::told(result);
-  EXPECT_EQ(result.refused.front().name, "battery_sag");
-  EXPECT_NEAR(result.refused.front().value, 40, 4);
-  EXPECT_NE(refusal(result.refused.front()).find("battery sag would have to be"), std::string::npos);
+  EXPECT_EQ(result.refused.front().name, "payload");
+  EXPECT_NE(refusal(result.refused.front()).find("payload would have to be 1.3"), std::string::npos)
+      << refusal(result.refused.front());
 }
 
 /// Lifted by `push` of the height over the surface below, along each window: in its mean and in the thrust's moments.
@@ -227,8 +254,8 @@ TEST(Plausible, APushThatReachesFartherThanAWashHasNoName) {
 }
 
 TEST(Plausible, ACeilingDoesNotPushDown) {
-  EXPECT_FALSE(form_of("ceiling").possible.front().holds(-0.1));
-  EXPECT_TRUE(form_of("ceiling").possible.front().holds(0.5));
+  EXPECT_FALSE(form_of("ceiling").priors.front().holds(-0.1));
+  EXPECT_TRUE(form_of("ceiling").priors.front().holds(0.5));
 }
 
 TEST(Plausible, ASizeAtAReferenceThatWasNotFlownIsToldAsExtrapolated) {

@@ -10,6 +10,7 @@
 
 #include "core/study/calibrate/calibration_rules.hpp"
 #include "core/study/design/design_rules.hpp"
+#include "core/study/effects/columns.hpp"
 #include "core/study/effects/table.hpp"
 #include "core/study/findings/self_test.hpp"
 #include "core/study/inference/rules.hpp"
@@ -117,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(OfARoom, NoConstant,
 /// end its file, or of a spectrum; bins that are told; counts of gates and of shifted set-points; heights of a way.
 bool is_an_entry(const std::string& line) {
   static const std::regex entry(
-      "\\.(least|floor|possible|scales) = |scales_of\\(|k(Wall|Height)Edges\\[\\] =|kHoverGates =|kShapes|kOwn "
+      "\\.(least|floor|priors|scales) = |scales_of\\(|k(Wall|Height)Edges\\[\\] =|kHoverGates =|kShapes|kOwn "
       "=|double height : \\{|"
       "motors_\\.size\\(\\) < 4");
   return std::regex_search(line, entry);
@@ -194,13 +195,33 @@ TEST(Effects, EveryFormSaysWhatItAddsAndFromWhichSizeOnItIsAnEffect) {
   for (const Form* f : catalogue()) {
     EXPECT_TRUE(formulas.insert(f->formula).second) << f->cause() << ": two forms with the same formula";
     EXPECT_FALSE(f->parameters.empty()) << f->formula;
-    EXPECT_EQ(f->possible.size(), f->parameters.size()) << f->formula << ": not each parameter says what is possible";
+    EXPECT_EQ(f->priors.size(), f->parameters.size()) << f->formula << ": not each parameter has a typical size";
     EXPECT_TRUE(f->columns) << f->formula;
     EXPECT_GT(f->floor + f->least, 0) << f->formula << ": neither floor nor least";
     EXPECT_EQ(f->scale_name.empty(), f->scales.size() == 1) << f->formula;
     EXPECT_EQ(f->effect->name, f->cause());
     for (const Form& shape : f->shapes) EXPECT_EQ(shape.parameters, f->parameters) << shape.formula;
   }
+}
+
+TEST(Effects, ThatNoFlightTellsAreRefusedByNameWhenTheCatalogueIsMade) {
+  const auto form = [](bool constant, auto columns) {
+    return Form{.formula = "made up", .parameters = {"B"}, .constant = constant, .columns = columns};
+  };
+  const auto factor = [](const Windows& ws, const Scale&) {
+    return std::vector{in_variance(ws, [](auto&) { return 1.0; })};
+  };
+  const auto push = [](const Windows& ws, const Scale&) {
+    return std::vector{level(ws, [](auto& w) -> Vec3 { return w.body_axis(1); })};
+  };
+  for (const bool constant : {false, true}) {
+    const auto why = stays_free(form(constant, factor));
+    ASSERT_TRUE(why) << "a constant factor on Σ is each craft's own level";
+    EXPECT_EQ(why->find("cannot be told: 'made up'"), 0u) << *why;
+  }
+  EXPECT_TRUE(stays_free(form(false, push)));
+  EXPECT_FALSE(stays_free(form(true, push))) << "trim claims the offset itself";
+  for (const Form* f : catalogue()) EXPECT_FALSE(stays_free(*f)) << f->formula;
 }
 
 }  // namespace

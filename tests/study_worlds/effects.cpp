@@ -99,7 +99,7 @@ std::map<std::string, HiddenCause> pushes() {
       {"payload",  // relative mass
        {.size = 0.02,
         .push = [](auto& a) { return up(a.now.thrust_acc * (1 / (1 + a.s) - 1)); },
-        .truth = {{"m", [](double s, double) { return 1 - 1 / (1 + s); }}}}},
+        .truth = {{"m", same}}}},
       {"trim",  // m/s² in the body's horizontal plane
        {.size = 0.12,
         .push = [](auto& a) -> Vec3 { return a.s * level(a.shape + a.now.yaw); },

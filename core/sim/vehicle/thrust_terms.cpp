@@ -52,4 +52,15 @@ double ThrustTerms::step(double nominal, double t, std::optional<double> voltage
 double setpoint_delay(std::span<const SimulationTerm> terms) { return sum_of(terms, Kind::setpoint_delay); }
 double more_attitude_lag(std::span<const SimulationTerm> terms) { return sum_of(terms, Kind::attitude_lag); }
 
+Vehicle::HorizontalVertical least_integrator(std::span<const SimulationTerm> terms,
+                                             const Vehicle::HorizontalVertical& kd) {
+  Vehicle::HorizontalVertical ki{0, 0};
+  for (const auto& term : terms) {
+    if (!term.is(Kind::shift_decay)) continue;
+    ki.horizontal = std::max(ki.horizontal, term.value[0] * kd.horizontal);
+    ki.vertical = std::max(ki.vertical, term.value[1] * kd.vertical);
+  }
+  return ki;
+}
+
 }  // namespace backwash::sim

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/types/simulation_term.hpp"
+#include "core/types/vehicle.hpp"
 
 namespace backwash::sim {
 
@@ -29,5 +30,8 @@ class ThrustTerms {
 double setpoint_delay(std::span<const SimulationTerm> terms);
 /// By how much the attitude lags longer than the vehicle file says, s.
 double more_attitude_lag(std::span<const SimulationTerm> terms);
+/// Least gain k_i of the velocity loop's integrator, 1/s²: of decays at the terms' fastest rate (docs/model.md 6-15b).
+Vehicle::HorizontalVertical least_integrator(std::span<const SimulationTerm> terms,
+                                             const Vehicle::HorizontalVertical& kd);
 
 }  // namespace backwash::sim

@@ -104,6 +104,10 @@ std::vector<Scale> rotors();
 /// 1 in the channel of one of four rotors, from `first` on; contrast: less the mean of the four.
 DesignColumn one_rotor(Channel first, const Windows& windows, const Scale& rotor, bool contrast);
 
+/// e^x − 1: of what was fitted to a logarithm.
+inline double share_of_ln(double x) { return std::expm1(x); }
+inline double as_fitted(double x) { return x; }
+
 /// Whether any window passes a test.
 template <typename F>
 bool any(const Observations& seen, F test) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/study/effects/prior_rules.hpp"
 #include "core/study/effects/remedy.hpp"
 #include "core/study/windows/observation.hpp"
 #include "core/types/model.hpp"
@@ -63,13 +64,6 @@ struct Manoeuvre {
 struct Effect;
 struct Form;
 
-/// The least and the most that a parameter can be, and why. A cause that would have to be beyond it is refused by name.
-struct Possible {
-  double least, most;
-  std::string reason;
-  bool holds(double value) const { return least <= value && value <= most; }
-};
-
 /// How far a push by distance can reach. One that the flights would draw out farther is none of this effect: what
 /// they show along `regressor` has no name.
 struct Reach {
@@ -98,7 +92,7 @@ struct FittedForm {
 struct Form {
   std::string formula;                      ///< what is added to which channel
   std::vector<std::string> parameters;      ///< one per column, unit in the name
-  std::vector<Possible> possible = {};      ///< one for each parameter
+  std::vector<Prior> priors = {};           ///< one for each parameter
   std::optional<Reference> reference = {};  ///< without one the size is that of what was flown
   std::string scale_name = {};              ///< "L_m" …; empty without a scale
   std::vector<Scale> scales = {Scale()};
@@ -133,7 +127,17 @@ struct Form {
   std::function<std::vector<SimulationTerm>(const FittedForm&, const Observations&)> simulate = {};
   const Effect* effect = nullptr;  ///< whose form it is; set by the table
 
+  /// What words and figures say of a parameter by its fitted number, one for each, rising; empty: the number itself.
+  std::vector<double (*)(double fitted)> meanings = {};
+
   const std::string& cause() const;  ///< the effect's name
+  /// A fitted parameter, or an end of its interval, as its words say it.
+  double in_words(std::size_t parameter, double fitted) const {
+    return parameter < meanings.size() ? meanings[parameter](fitted) : fitted;
+  }
+  /// Nats that sizes θ of its p parameters, typically s, cost beforehand: (p + 1)/2 ln(1 + Σ (θ/s)²), docs/model.md
+  /// 8-3b. That is −ln of Cauchy's density over its value at 0: tails so heavy that what flights show plainly stands.
+  double prior_nats(std::span<const double> sizes) const;
 };
 
 /// Where an effect is that rotors differ by. Those of a sound craft differ too: without sound flights it is not told.

@@ -6,7 +6,7 @@
 namespace backwash::study {
 
 /// Every constant that effects share and that decides what they explain (`backwash study --rules`). Members are rules
-/// and nothing else. What a single form alone has (floor, least, possible, scales, reference) is in its file, under
+/// and nothing else. What a single form alone has (floor, least, priors, scales, reference) is in its file, under
 /// these names.
 struct EffectRules {
   // Surfaces and the place of a window
@@ -24,6 +24,9 @@ struct EffectRules {
   Rule no_sag{"no_sag", 1e-6, "1", "derived: so that it can be divided by"};
   Rule line_share{"line_share", 0.1, "of the windows of all rotors",
                   "chosen: fewer lines are too few to speak for the flights"};
+  // What stays free
+  Rule drawn_windows{"drawn_windows", 32, "windows", "derived: more than the columns of any form and what stays free"};
+  Rule left_of_free{"left_of_free", 1e-6, "of a column's square", "derived: more than rounding leaves"};
   // Structures
   Rule few_cosines{"few_cosines", 4, "cosines", "chosen: of a rank, for what varies slowly"};
   Rule many_cosines{"many_cosines", 8, "cosines", "chosen: of a rank, for what varies faster; more cost draws"};

@@ -1,7 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/effects/table.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+#include "core/study/effects/effect_rules.hpp"
+#include "core/study/effects/regressors.hpp"
 
 namespace backwash::study {
 
@@ -17,9 +24,82 @@ constexpr Effect (*kEffects[])() = {
     payload,       trim,      draft,           rotor_drag,    inflow,           actuator_lag,      command_latency,
     imu_drift,     vibration, map_offset,      heavy_tails,   propeller_damage, rotor_sensor_fault};
 
+/// Windows in which everything that a column may be made of varies.
+Observations drawn_windows() {
+  Observations seen;
+  std::minstd_rand rng;
+  std::uniform_real_distribution<double> half_to_one(0.5, 1.0);
+  const auto draw = [&] { return half_to_one(rng); };
+  const auto vector = [&]() -> Vec3 { return {draw(), -draw(), draw()}; };
+  for (int i = 0; i < kEffectRules.drawn_windows; ++i) {
+    WindowRow w{};
+    w.t = 10 * draw();
+    w.duration = kWindowRules.window_length;
+    w.p_W = vector();
+    w.v_W = vector();
+    w.speed = draw();
+    for (auto* all : {&w.speeds, &w.shares, &w.climbs, &w.delay_at, &w.slope_at})
+      for (double& x : *all) x = draw();
+    for (auto* pair : {&w.delay_gain, &w.slope_gain, &w.mean_gain, &w.command_gain, &w.lag_gain})
+      *pair = {draw(), -draw()};
+    w.tilt_gain = draw();
+    w.R_WB = Eigen::AngleAxisd(4 * draw(), Vec3::UnitZ()).toRotationMatrix();
+    w.thrust_acc = kGravity * draw();
+    w.voltage = 10 * draw();
+    w.temperature = 50 * draw();
+    w.around.height = draw();
+    w.around.ceiling_gap = draw();
+    w.around.walls = w.around.whole_walls = {{draw(), w.body_axis(0)}};
+    w.path.assign(kPoints, w.around);
+    w.led = WindowRow::Led{vector().cwiseAbs(), vector(), vector(), vector().cwiseAbs(), vector()};
+    w.varied2 = vector().cwiseAbs();
+    w.sigma = vector().cwiseAbs();
+    for (Vec3& ln : w.ln_sigma_moved) ln = vector();
+    seen.windows.push_back(std::move(w));
+  }
+  return seen;
+}
+
+bool of_variances(const DesignColumn& column) {
+  return std::ranges::all_of(column.parts, [](auto& p) { return p.channel >= kVarX && p.channel <= kVarZ; });
+}
+
+/// All channels of a column behind each other.
+Eigen::VectorXd stacked(const DesignColumn& column, std::size_t windows) {
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(kChannels * windows));
+  for (const auto& part : column.parts)
+    for (std::size_t i = 0; i < windows; ++i) x[static_cast<Eigen::Index>(part.channel * windows + i)] += part.x[i];
+  return x;
+}
+
 }  // namespace
 
+std::optional<std::string> stays_free(const Form& form) {
+  const Observations seen = drawn_windows();
+  const auto columns = form.columns(seen.windows, form.scales.front());
+  auto free = offsets(columns, seen);
+  if (form.constant) std::erase_if(free, [](auto& column) { return !of_variances(column); });
+  Eigen::MatrixXd N(static_cast<Eigen::Index>(kChannels * seen.windows.size()), static_cast<Eigen::Index>(free.size()));
+  for (std::size_t k = 0; k < free.size(); ++k)
+    N.col(static_cast<Eigen::Index>(k)) = stacked(free[k], seen.windows.size());
+  for (const auto& column : columns) {
+    const Eigen::VectorXd x = stacked(column, seen.windows.size());
+    const Eigen::VectorXd left =
+        free.empty() ? x : Eigen::VectorXd(x - N * N.completeOrthogonalDecomposition().solve(x));
+    if (!(left.squaredNorm() <= kEffectRules.left_of_free * x.squaredNorm())) continue;
+    return "cannot be told: '" + form.formula + "' is spanned by what stays free: offsets" +
+           (of_variances(column) ? ", and of Σ the level, which is each craft's own (calibrate measures it)" : "");
+  }
+  return std::nullopt;
+}
+
 const std::string& Form::cause() const { return effect->name; }
+
+double Form::prior_nats(std::span<const double> sizes) const {
+  double square = 0;
+  for (std::size_t k = 0; k < priors.size(); ++k) square += std::pow(sizes[k] / priors[k].typical, 2);
+  return 0.5 * static_cast<double>(priors.size() + 1) * std::log1p(square);
+}
 
 std::vector<Scale> scales_of(std::initializer_list<double> values) {
   std::vector<Scale> scales;
@@ -34,6 +114,7 @@ const std::vector<Effect>& effects() {
     for (Effect& e : made)
       for (Form& f : e.forms) {
         f.effect = &e;
+        if (const auto why = stays_free(f)) throw std::logic_error(e.name + " " + *why);
         for (Form& shape : f.shapes) {
           shape.effect = &e;
           shape.parameters = f.parameters;

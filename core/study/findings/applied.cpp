@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "core/study/inference/coverage.hpp"
+#include "core/study/findings/held_out.hpp"
 #include "core/study/inference/rules.hpp"
 
 namespace backwash::study {
@@ -49,77 +49,11 @@ SmallVector with_companions(const NormalEquations& normal, const SmallVector& th
   return all;
 }
 
-using Moved = std::array<std::vector<double>, kChannels>;
-
-void add(Moved& moved, const std::vector<DesignColumn>& columns, const SmallVector& by, std::size_t begin,
-         std::size_t end, std::size_t windows) {
-  for (std::size_t k = 0; k < columns.size(); ++k)
-    for (const auto& part : columns[k].parts) {
-      moved[part.channel].resize(windows, 0);
-      for (std::size_t i = begin; i < end; ++i) moved[part.channel][i] += by[static_cast<Eigen::Index>(k)] * part.x[i];
-    }
-}
-
-double at(const Moved& moved, std::size_t channel, std::size_t i) {
-  return moved[channel].empty() ? 0 : moved[channel][i];
-}
-
-/// Errors of the window values: those of ln variance about their mean.
-void measure_error(Applied& applied, const Observations& seen, const Moved& own, const Moved& others) {
-  double before = 0, after = 0, count = 0;
-  for (std::size_t c = 0; c < kChannels; ++c) {
-    if (own[c].empty()) continue;
-    double level_before = 0, level_after = 0, weight = 0;
-    const auto left = [&](std::size_t i) { return seen.y[c][i] - at(others, c, i); };
-    for (std::size_t i = 0; i < own[c].size() && c >= kVarX && c <= kVarZ; ++i) {
-      const double w = seen.weight[c][i];
-      level_before += w * left(i);
-      level_after += w * (left(i) - own[c][i]);
-      weight += w;
-    }
-    if (weight > 0) {
-      level_before /= weight;
-      level_after /= weight;
-    }
-    for (std::size_t i = 0; i < own[c].size(); ++i) {
-      const double w = seen.weight[c][i];
-      before += w * std::pow(left(i) - level_before, 2);
-      after += w * std::pow(left(i) - own[c][i] - level_after, 2);
-      count += w;
-    }
-  }
-  if (count > 0) {
-    applied.rmse_before = std::sqrt(before / count);
-    applied.rmse_after = std::sqrt(after / count);
-  }
-}
-
-void measure_coverage(Applied& applied, const Observations& seen, const Moved& own, const Moved& others) {
-  double before = 0, after = 0, samples = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::size_t mean = kMeanX + static_cast<std::size_t>(axis), variance = kVarX + static_cast<std::size_t>(axis);
-    for (std::size_t i = 0; i < seen.windows.size(); ++i) {
-      if (!(seen.weight[variance][i] > 0)) continue;
-      const auto& w = seen.windows[i];
-      const double m = seen.y[mean][i] - at(others, mean, i), sigma = w.sigma[axis] * std::exp(at(others, variance, i));
-      before += share_of_interval(m, w.measured_variance[axis], sigma);
-      after +=
-          share_of_interval(m - at(own, mean, i), w.measured_variance[axis], sigma * std::exp(at(own, variance, i)));
-      samples += 1;
-    }
-  }
-  if (samples > 0) {
-    applied.coverage_before = before / samples;
-    applied.coverage_after = after / samples;
-  }
-}
-
 /// Judges cause `which` among those that join the model.
 Applied judged(const Evidence& evidence, const std::vector<Accepted>& all, const std::vector<Applied>& known,
                std::size_t which) {
   const Observations& seen = evidence.seen();
   const Accepted& cause = all[which];
-  const std::size_t n = seen.windows.size();
   const Parts parts = parts_of(cause, seen);
   std::vector<DesignColumn> beside;
   Moved own, others;
@@ -132,7 +66,7 @@ Applied judged(const Evidence& evidence, const std::vector<Accepted>& all, const
     by.head(all[j].theta.size()) = all[j].theta;
     for (std::size_t k = 0; k < known[j].beside.size(); ++k)
       by[all[j].theta.size() + static_cast<Eigen::Index>(k)] = known[j].beside[k];
-    add(others, other.columns, by, 0, n, n);
+    add(others, other.columns, by, 0, seen.windows.size(), seen);
   }
   std::vector<DesignColumn> free = beside, levels = beside;
   if (!cause.form->constant)
@@ -151,10 +85,11 @@ Applied judged(const Evidence& evidence, const std::vector<Accepted>& all, const
   for (std::size_t f = 0; f < seen.units.size(); ++f) {
     const SmallVector by = with_companions(joint, theta.fit_without(f), f);
     applied.nats += by.dot(joint.b[f]) - 0.5 * by.dot(joint.A[f] * by);
-    add(own, parts.columns, by, seen.units.first[f], seen.units.first[f + 1], n);
+    add(own, parts.columns, by, seen.units.first[f], seen.units.first[f + 1], seen);
   }
-  measure_error(applied, seen, own, others);
-  measure_coverage(applied, seen, own, others);
+  const Covered share = covered(seen, own, others);
+  applied.coverage_before = share.before;
+  applied.coverage_after = share.after;
   return applied;
 }
 

@@ -14,7 +14,6 @@ namespace backwash::study {
 struct Applied {
   std::vector<double> beside;                      ///< coefficients of the form's companions, fitted to all flights
   double nats = 0;                                 ///< held out
-  double rmse_before = 0, rmse_after = 0;          ///< of the window values in the cause's channels
   double coverage_before = 0, coverage_after = 0;  ///< share of samples in the model's central 90 % interval
   std::string refused;                             ///< why it does not join the model; empty: it does
 };

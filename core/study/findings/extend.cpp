@@ -87,9 +87,9 @@ std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations&
   if (!f.form->extend) return {};
   auto effects = f.form->extend({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
   for (auto& e : effects) {
-    if (entry(e.kind).of_variance || !cause.shift.refuted()) continue;
+    if (entry(e.kind).of_variance || cause.keeps) continue;
     e.error += e.value.cwiseAbs();
-    e.value.setZero();  // the craft rests on its set-point: in the bound, not the centre
+    e.value.setZero();  // it may rest on its set-point: in the bound, not the centre
   }
   return effects;
 }
@@ -97,7 +97,10 @@ std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations&
 std::vector<SimulationTerm> simulation_of(const NamedCause& cause, const Observations& seen) {
   const Accepted& f = cause.found;
   const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
-  return f.form->simulate({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
+  auto terms = f.form->simulate({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
+  if (std::ranges::any_of(cause.shift_decay, [](double rate) { return rate > 0; }))
+    terms.push_back({SimulationTerm::Kind::shift_decay, {cause.shift_decay.begin(), cause.shift_decay.end()}});
+  return terms;
 }
 
 std::optional<std::string> why_unwritable(const NamedCause& cause, const Observations& seen) {

@@ -8,104 +8,12 @@
 #include "core/study/findings/extend.hpp"
 #include "core/study/findings/when_it_acts.hpp"
 #include "core/study/findings/words.hpp"
-#include "core/study/inference/coverage.hpp"
 #include "core/study/inference/estimate.hpp"
 #include "core/study/inference/rivals.hpp"
 #include "core/study/inference/rotors/rotor_rules.hpp"
 
 namespace backwash::study {
 namespace {
-
-/// What the cause adds to a channel in each window, its parameters fitted without the window's flight.
-std::vector<double> held_out(const Accepted& cause, const NormalEquations& normal, const Observations& seen,
-                             Channel channel) {
-  std::vector<double> sum(seen.windows.size(), 0);
-  for (std::size_t f = 0; f < seen.units.size(); ++f) {
-    const SmallVector theta = normal.fit_without(f);
-    for (std::size_t k = 0; k < cause.columns.size(); ++k)
-      for (const auto& part : cause.columns[k].parts)
-        if (part.channel == channel)
-          for (std::size_t i = seen.units.first[f]; i < seen.units.first[f + 1]; ++i)
-            sum[i] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
-  }
-  return sum;
-}
-
-struct Covered {
-  double before = 0, after = 0;
-};
-
-/// Share of the windows' samples within the central 90 %, without and with what the cause moves by channel.
-Covered covered(const Observations& seen, const std::array<std::vector<double>, kChannels>& moved) {
-  double covered_before = 0, covered_after = 0, samples = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::size_t mean = kMeanX + static_cast<std::size_t>(axis), variance = kVarX + static_cast<std::size_t>(axis);
-    for (std::size_t i = 0; i < seen.windows.size(); ++i) {
-      const auto& w = seen.windows[i];
-      if (!(seen.weight[variance][i] > 0)) continue;
-      const double m = seen.y[mean][i], x_m = moved[mean].empty() ? 0 : moved[mean][i];
-      const double factor = moved[variance].empty() ? 1 : std::exp(moved[variance][i]);
-      covered_before += share_of_interval(m, w.measured_variance[axis], w.sigma[axis]);
-      covered_after += share_of_interval(m - x_m, w.measured_variance[axis], w.sigma[axis] * factor);
-      samples += 1;
-    }
-  }
-  return samples > 0 ? Covered{covered_before / samples, covered_after / samples} : Covered{};
-}
-
-/// `total`: of all accepted causes; `own`: of this one. Residuals y − (total − own) before, y − total after.
-Gain gain_of(const Evidence& evidence, const std::vector<Accepted>& all, std::size_t which) {
-  const Observations& seen = evidence.seen();
-  const Accepted& cause = all[which];
-  auto nuisance = cause.form->constant ? std::vector<DesignColumn>{} : offsets(cause.columns, seen);
-  const auto others = columns_of(all, seen, which);
-  nuisance.insert(nuisance.end(), others.begin(), others.end());
-  const NormalEquations normal = evidence.normal(cause.columns, nuisance);
-  Gain gain;
-  if (!normal.solvable) return gain;
-  const auto per_flight = normal.gain_per_flight();
-  const double n = static_cast<double>(per_flight.size());
-  double square = 0;
-  for (const double g : per_flight) gain.held_out_nats += g;
-  for (const double g : per_flight) square += std::pow(g - gain.held_out_nats / n, 2);
-  const double error = student_975(n - 1) * std::sqrt(square * n / (n - 1));
-  gain.low_nats = gain.held_out_nats - error;
-  gain.high_nats = gain.held_out_nats + error;
-
-  double before = 0, after = 0, count = 0;
-  std::array<std::vector<double>, kChannels> moved;
-  for (std::size_t c = 0; c < kChannels; ++c) {
-    const auto x = held_out(cause, normal, seen, static_cast<Channel>(c));
-    if (std::none_of(x.begin(), x.end(), [](double v) { return v != 0; })) continue;
-    // Offsets that stand beside the cause (offsets()) and that it does not claim are taken out of both.
-    double offset_before = 0, offset_after = 0, weight = 0;
-    for (std::size_t i = 0; i < x.size() && !cause.form->constant && c <= kVarZ; ++i) {
-      const double w = seen.weight[c][i];
-      offset_before += w * seen.y[c][i];
-      offset_after += w * (seen.y[c][i] - x[i]);
-      weight += w;
-    }
-    if (weight > 0) {
-      offset_before /= weight;
-      offset_after /= weight;
-    }
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      const double w = seen.weight[c][i];
-      before += w * std::pow(seen.y[c][i] - offset_before, 2);
-      after += w * std::pow(seen.y[c][i] - offset_after - x[i], 2);
-      count += w;
-    }
-    moved[c] = x;
-  }
-  if (count > 0) {
-    gain.rmse_before = std::sqrt(before / count);
-    gain.rmse_after = std::sqrt(after / count);
-  }
-  const Covered shares = covered(seen, moved);
-  gain.coverage_before = shares.before;
-  gain.coverage_after = shares.after;
-  return gain;
-}
 
 /// Flights with windows.
 std::size_t flown(const Observations& seen) {
@@ -153,26 +61,55 @@ std::vector<UnknownStructure> with_dependence(std::vector<UnknownStructure> unkn
   return unknown;
 }
 
-/// Gain, worth as applied and hover shift of what acts in all flights.
-std::vector<NamedCause> in_all_flights(const Evidence& evidence, const std::vector<Accepted>& accepted) {
+/// Whether a cause moves the means of level axes (0) or of z (1) itself.
+bool moves(const Accepted& cause, std::size_t axes) {
+  return std::ranges::any_of(cause.columns, [&](auto& column) {
+    return std::ranges::any_of(column.parts, [&](auto& part) {
+      return !part.aside && (axes == 0 ? part.channel <= kMeanY : part.channel == kMeanZ);
+    });
+  });
+}
+
+/// What the loop makes of a cause's push.
+void tell_positions(NamedCause& cause, const SteadyAnswer& answer) {
+  for (std::size_t k = 0; k < answer.axes.size(); ++k) {
+    const auto& axes = answer.axes[k];
+    if (cause.found.form->in_sensor || !moves(cause.found, k)) continue;
+    cause.shift_decay[k] = axes.rate;
+    cause.keeps = cause.keeps && axes.keeps();
+    if (!axes.told())
+      cause.positions = "whether the loop holds its push off cannot be told: of the shift " + number(axes.low) +
+                        " to " + number(axes.high) +
+                        " is left; positions of plans and simulations are not this craft's";
+  }
+}
+
+/// Gain, worth as applied and positions of what acts in all flights.
+std::vector<NamedCause> in_all_flights(const Evidence& evidence, const std::vector<Accepted>& accepted,
+                                       SteadyAnswer& answer) {
   std::vector<NamedCause> causes;
   std::vector<std::string> unwritable(accepted.size());
   auto applied = judge(evidence, accepted, unwritable);
   for (std::size_t i = 0; i < accepted.size(); ++i) {
-    const NamedCause cause{accepted[i], {}, {}, applied[i]};
+    NamedCause cause{};
+    cause.found = accepted[i];
+    cause.applied = applied[i];
     if (!applied[i].refused.empty()) continue;
     if (const auto why = why_unwritable(cause, evidence.seen())) unwritable[i] = "no model file holds it: " + *why;
   }
   if (std::ranges::any_of(unwritable, [](auto& why) { return !why.empty(); }))
     applied = judge(evidence, accepted, unwritable);
+  std::vector<std::vector<double>> beside;
+  for (const Applied& each : applied) beside.push_back(each.beside);
+  answer = steady_answer(pushes(accepted, beside, evidence.seen()), evidence.seen());
   for (std::size_t i = 0; i < accepted.size(); ++i) {
-    NamedCause cause{accepted[i],
-                     gain_of(evidence, accepted, i),
-                     {},
-                     applied[i],
-                     extrapolated(accepted[i], evidence.seen()),
-                     largest_flown(accepted[i], evidence.seen()),
-                     check_shift(accepted[i], applied[i].beside, evidence.seen())};
+    NamedCause cause{};
+    cause.found = accepted[i];
+    cause.gain = held_out(evidence, accepted, i);
+    cause.applied = applied[i];
+    cause.extrapolated = extrapolated(accepted[i], evidence.seen());
+    cause.largest_flown = largest_flown(accepted[i], evidence.seen());
+    tell_positions(cause, answer);
     if (cause.found.form->anchor) cause.found.scale.anchor = cause.found.form->anchor(evidence.seen().windows);
     causes.push_back(std::move(cause));
   }
@@ -192,7 +129,7 @@ std::optional<Doubt> doubted_payload(const NamedCause& cause, double unjudged) {
   if (found.form->effect->at_rotors != AtRotors::weight || found.form->motors_alone || !cause.flights.empty() ||
       found.parameters.empty())
     return std::nullopt;
-  const double lost = found.parameters.front().value;
+  const double lost = found.theta[0];
   if (lost <= 0 || unjudged < kRotorRules.unjudged_loss * lost) return std::nullopt;
   const auto propeller = std::ranges::find_if(
       catalogue(), [](auto* form) { return form->effect->at_rotors == AtRotors::propeller && !form->motors_alone; });
@@ -229,14 +166,15 @@ std::optional<Doubt> doubted_drift(const NamedCause& cause, const Observations& 
 
 /// All that was found, with what it is told apart by. `unjudged`: as of untested().
 std::vector<NamedCause> causes_of(const WholeSearch& whole, const Evidence& evidence, const Observations& seen,
-                                  std::optional<double> unjudged, const std::optional<SoundRotors>& sound) {
-  std::vector<NamedCause> causes = in_all_flights(evidence, whole.found.accepted);
+                                  std::optional<double> unjudged, const std::optional<SoundRotors>& sound,
+                                  SteadyAnswer& answer) {
+  std::vector<NamedCause> causes = in_all_flights(evidence, whole.found.accepted, answer);
   for (const auto& cause : whole.changes) causes.push_back(named(cause, evidence));
   const double between_craft = sound ? sound->spread : kRotorRules.rotor_spread.value;
   for (auto& cause : causes) {
     const bool some = !cause.flights.empty();  // against the craft's own other flights
     const double spread = some ? kRules.motor_scatter.value : between_craft;
-    cause.found = tell_shares(name_by_balance(std::move(cause.found), whole.rest, some, spread));
+    cause.found = in_words(name_by_balance(std::move(cause.found), whole.rest, some, spread));
     for (const Rival& rival : cause.found.rivals)
       cause.separate_by.push_back(separations(evidence, cause.found, rival).front());
     const auto payload = unjudged ? doubted_payload(cause, *unjudged) : std::nullopt;
@@ -257,7 +195,7 @@ StudyVerdict verdict_of(const std::vector<NamedCause>& causes, const std::vector
 
 }  // namespace
 
-double coverage(const Observations& seen) { return covered(seen, {}).before; }
+double coverage(const Observations& seen) { return covered(seen, {}, {}).before; }
 
 const char* to_string(StudyVerdict verdict) {
   static const char* const kNames[] = {"cause_found", "cannot_distinguish", "unknown_structure", "nothing_found",
@@ -273,7 +211,8 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   const CauseSearchResult& found = whole.found;
   Evidence evidence = whole.evidence();
   evidence.whiten(columns_of(found.accepted, whole.rest));
-  const auto causes = causes_of(whole, evidence, seen, settled.unjudged, options.sound);
+  SteadyAnswer answer;
+  const auto causes = causes_of(whole, evidence, seen, settled.unjudged, options.sound, answer);
   const bool silent = causes.empty() && found.unknown.empty() && options.search.known.empty();
   const auto remaining =
       options.dependence ? what_remains(evidence, found.accepted, silent, options.search) : std::vector<Dependence>{};
@@ -282,6 +221,7 @@ StudyResult study(const Observations& seen, const StudyOptions& options) {
   if (options.minimum_detectable) options.search.progress("smallest effects that these flights would show");
   return {.verdict = verdict_of(causes, unknown),
           .causes = causes,
+          .steady = answer,
           .unknown = unknown,
           .refused = found.refused,
           .not_tested = untested(seen, settled.unjudged),
@@ -306,7 +246,8 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
       for (const auto& signs : draws) {
         for (std::size_t f = 0; f < injected.b.size(); ++f)
           injected.b[f] = signs[f] * c.normal.b[f] + size * c.normal.A[f].col(0);
-        if (injected.gain() >= threshold && c.effect(injected.fit())) ++found;
+        const SmallVector fit = injected.fit();
+        if (injected.gain() - c.prior_nats(fit) >= threshold && c.effect(fit)) ++found;
       }
       return static_cast<double>(found) / kFlips;
     };
@@ -317,7 +258,7 @@ std::map<std::string, std::map<std::string, double>> minimum_detectable(const Ev
       (power(std::exp(middle)) >= kRules.power ? high : low) = middle;
     }
     auto& entry = least[c.name];
-    const double size = std::exp(high);
+    const double size = c.form->in_words(0, std::exp(high));
     const auto [at, fresh] = entry.emplace(c.form->parameters[0], size);
     if (!fresh) at->second = std::min(at->second, size);
   });

@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "core/study/findings/applied.hpp"
-#include "core/study/findings/shift.hpp"
+#include "core/study/findings/held_out.hpp"
+#include "core/study/findings/steady_answer.hpp"
 #include "core/study/inference/levels/dependence.hpp"
 #include "core/study/inference/rotors/sound_rotors.hpp"
 #include "core/study/inference/whole_search.hpp"
@@ -16,14 +17,6 @@ namespace backwash::study {
 
 enum class StudyVerdict { cause_found, cannot_distinguish, unknown_structure, nothing_found, insufficient };
 const char* to_string(StudyVerdict verdict);
-
-/// What a cause is worth on flights that its parameters were not fitted to.
-struct Gain {
-  double held_out_nats = 0;
-  double rmse_before = 0, rmse_after = 0;          ///< of the window values in the cause's channels, m/s² or ln
-  double low_nats = 0, high_nats = 0;              ///< 95 %, over flights
-  double coverage_before = 0, coverage_after = 0;  ///< share of samples in the model's central 90 % interval
-};
 
 struct Separation {
   std::string rival, manoeuvre;
@@ -37,7 +30,9 @@ struct NamedCause {
   Applied applied = {};                    ///< what the extension by it is worth; refused: it does not join the model
   std::string extrapolated = {};           ///< why the size is none that was flown (words.hpp)
   double largest_flown = 0;                ///< m/s² or ln: what the cause added at most, of its first channel
-  ShiftCheck shift = {};                   ///< whether the craft hovers where its push would hold it
+  std::array<double, 2> shift_decay{};     ///< level and up, 1/s: at which the loop holds its push off; 0: it does not
+  bool keeps = true;                       ///< the craft rests where the push holds it: plans move their centre there
+  std::string positions = {};              ///< why its positions are not to be believed; empty: they are
   std::vector<ActingFlight> flights = {};  ///< in which it acts; empty: all
   std::string when = {};                   ///< of a change (when_it_acts.hpp)
 };
@@ -54,8 +49,9 @@ struct StudyOptions {
 struct StudyResult {
   StudyVerdict verdict = StudyVerdict::nothing_found;
   std::vector<NamedCause> causes{};
+  SteadyAnswer steady{};  ///< of the loop that flew, to all causes together
   std::vector<UnknownStructure> unknown{};
-  std::vector<Refused> refused{};  ///< causes that would have led, but for a size that no vehicle can have
+  std::vector<Refused> refused{};  ///< causes that would have led, but for a size that their laws cannot have
   std::vector<std::pair<std::string, std::string>> not_tested{};  ///< name, why
   /// Per cause and parameter: least size found with 80 % power.
   std::map<std::string, std::map<std::string, double>> minimum_detectable{};

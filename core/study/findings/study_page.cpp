@@ -142,23 +142,18 @@ std::string figures(const NamedCause& cause, const PageContext& context) {
   if (context.read_vehicle) text += row("What to change", remedy_of(cause, *context.read_vehicle).words);
   for (const auto& e : cause.found.parameters)
     text += row(spoken(e.name), number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
+  text += row("The size", beforehand(cause.found));
   if (!cause.extrapolated.empty()) text += row("The size is extrapolated", cause.extrapolated);
   text += row("Probability of as much by chance, over everything tried", number(cause.found.p));
   text += row("Gain on flights not fitted", number(g.held_out_nats) + " nats  [" + number(g.low_nats) + ", " +
                                                 number(g.high_nats) + "]: odds of " + odds(g.held_out_nats));
-  text += row("Error of the windows, before and after", number(g.rmse_before) + " → " + number(g.rmse_after));
+  for (const auto& c : g.channels)
+    text += row(std::string("Error of ") + channel_name(c.channel) + ", before and after, flights not fitted",
+                number(c.before) + " → " + number(c.after));
   text += row("Samples in the model's central 90 %, before and after",
               number(g.coverage_before) + " → " + number(g.coverage_after));
-  const auto& a = cause.applied;
-  text += row("As applied, without any free offset", number(a.nats) + " nats; samples in the central 90 % " +
-                                                         number(a.coverage_before) + " → " + number(a.coverage_after));
-  if (cause.shift.tested)
-    text += row("Hovers off their set-points, of what this push predicts",
-                number(cause.shift.slope) + "  [" + number(cause.shift.low) + ", " + number(cause.shift.high) + "]" +
-                    (cause.shift.refuted() ? ": refuted, plans keep the centre. If the loop has an integrator, set "
-                                             "controller.velocity_integrator of the vehicle file"
-                                           : ""));
-  if (!a.refused.empty()) text += row("Does not join the model", a.refused);
+  if (!cause.positions.empty()) text += row("Positions are refused", cause.positions);
+  if (!cause.applied.refused.empty()) text += row("Does not join the model", cause.applied.refused);
   for (const auto& s : cause.separate_by)
     text += row("Not told from " + spoken(s.rival),
                 "fly next: " + s.manoeuvre +
@@ -269,6 +264,10 @@ std::string study_page(const StudyResult& result, const Observations& seen, cons
                             picture(cause, seen, data) + figures(cause, context));
   if (context.height) page += height_section(*context.height);
   if (context.rotors) page += rotor_section(*context.rotors, data);
+  std::string loop;
+  for (std::size_t k = 0; k < result.steady.axes.size(); ++k)
+    if (const auto text = steady_words(result.steady, k); !text.empty()) loop += (loop.empty() ? "" : ". ") + text;
+  if (!loop.empty()) page += report::section("How the loop answers a steady push", report::escaped(loop + "."), "");
   if (context.consequence) page += consequence_section(*context.consequence);
   page += unknown_section(result.unknown);
   page += context.residuals;

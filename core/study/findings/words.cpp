@@ -19,6 +19,13 @@ Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle) {
   return {RemedyIn::craft, {}, "Look for what was different: " + where(cause) + "."};  // no file holds for some flights
 }
 
+Accepted in_words(Accepted cause) {
+  for (std::size_t k = 0; k < cause.form->parameters.size() && k < cause.parameters.size(); ++k)
+    for (double* x : {&cause.parameters[k].value, &cause.parameters[k].low, &cause.parameters[k].high})
+      *x = cause.form->in_words(k, *x);
+  return cause;
+}
+
 std::string percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
 
 std::string odds(double nats) {
@@ -57,8 +64,25 @@ std::string extrapolated(const Accepted& cause, const Observations& seen) {
 }
 
 std::string refusal(const Refused& r) {
-  return spoken(r.name) + " would have to be " + number(r.value) + " (" + r.parameter + "), possible are " +
-         number(r.possible.least) + " to " + number(r.possible.most) + ": " + r.possible.reason;
+  return spoken(r.name) + " would have to be " + number(r.value) + " (" + r.parameter + "), its law has " +
+         number(r.least) + " to " + number(r.most) + ": " + r.reason;
+}
+
+std::string steady_words(const SteadyAnswer& answer, std::size_t axes) {
+  const auto& s = answer.axes[axes];
+  if (!s.matters()) return "";
+  const std::string loop = !s.told()    ? "cannot be told whether the loop holds it off"
+                           : s.rate > 0 ? "the loop holds it off at " + number(s.rate) + " 1/s"
+                                        : "the loop keeps it";
+  return std::string(axes == 0 ? "level" : "up") + ": " + number(s.left) + " [" + number(s.low) + ", " +
+         number(s.high) + "] of a steady push's shift is left; " + loop;
+}
+
+std::string beforehand(const Accepted& cause) {
+  double most = 0;
+  for (std::size_t k = 0; k < cause.form->priors.size(); ++k)
+    most = std::max(most, std::abs(cause.theta[static_cast<Eigen::Index>(k)]) / cause.form->priors[k].typical);
+  return number(most) + " times what is typical: " + odds(-prior_nats_of(cause)) + " beforehand";
 }
 
 std::optional<double> clearance_cost(const Consequence& c) {

@@ -13,6 +13,9 @@ namespace backwash::study {
 /// What to change for a cause that was found: file, key, value, or what to do with the craft.
 Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle);
 
+/// Parameters and the ends of their intervals as their words say them (Form::meanings): once, and last.
+Accepted in_words(Accepted cause);
+
 /// A share in whole percent: "15 %".
 std::string percent(double share);
 
@@ -26,8 +29,14 @@ std::string extrapolated(const Accepted& cause, const Observations& seen);
 /// Largest |Σ θ x| over the flown windows of the cause's first channel, in that channel's unit (m/s² or ln).
 double largest_flown(const Accepted& cause, const Observations& seen);
 
-/// "ground_thrust would have to be 172 A_mps2 (possible: -3 to 3): …".
+/// "rotor drag would have to be -0.2 (k, 1/s), its law has 0 to inf: drag brakes".
 std::string refusal(const Refused& refused);
+/// "level: 0.02 [-0.1, 0.1] of a steady push's shift is left; the loop holds it off at 0.3 1/s"; empty where the pushes
+/// move nothing. `axes`: 0 level, 1 up.
+std::string steady_words(const SteadyAnswer& answer, std::size_t axes);
+/// "40 times what is typical: 1 to 1600 beforehand", however small. The parameter that is farthest from its typical
+/// size is told.
+std::string beforehand(const Accepted& cause);
 
 /// Clearance that the causes take from the same plan, m: before less after. Nothing unless both plans are ok.
 std::optional<double> clearance_cost(const Consequence& consequence);

@@ -19,8 +19,8 @@ bool fitted(SearchCandidate& c, const Evidence& evidence, const std::vector<Desi
   if (c.columns.size() > static_cast<std::size_t>(kMostColumns)) return false;
   c.normal = evidence.normal(c.columns, nuisance);
   if (!c.normal.solvable) return false;
-  c.gain = c.normal.gain();
   c.fit = c.normal.fit();
+  c.gain = c.normal.gain() - c.prior_nats(c.fit);
   c.size = evidence.size(c.columns);
   return true;
 }
@@ -56,11 +56,15 @@ bool SearchCandidate::large_enough(const SmallVector& theta) const {
   return square >= form->floor * form->floor;
 }
 
-std::optional<std::size_t> SearchCandidate::beyond_possible(const SmallVector& theta) const {
+std::optional<std::size_t> SearchCandidate::beyond_ends(const SmallVector& theta) const {
   if (!form) return std::nullopt;
-  for (std::size_t k = 0; k < form->possible.size() && k < static_cast<std::size_t>(theta.size()); ++k)
-    if (!form->possible[k].holds(theta[static_cast<Eigen::Index>(k)])) return k;
+  for (std::size_t k = 0; k < form->priors.size() && k < static_cast<std::size_t>(theta.size()); ++k)
+    if (!form->priors[k].holds(theta[static_cast<Eigen::Index>(k)])) return k;
   return std::nullopt;
+}
+
+double SearchCandidate::prior_nats(const SmallVector& theta) const {
+  return form ? form->prior_nats({theta.data(), static_cast<std::size_t>(theta.size())}) : 0;
 }
 
 std::vector<DesignColumn> nuisance_of(const Form& form, const std::vector<DesignColumn>& columns,
@@ -199,8 +203,11 @@ void NullMaxima::add(const SearchCandidate& candidate) {
         0.5 * (1 + kRules.bound_error) * SmallVector(bounded.matrixL().solve(sum)).squaredNorm() <= maxima_[d])
       continue;
     if (!may_be_effect(candidate, whole.solve(sum))) continue;
-    const double gain = normal.gain(draws_[d]);
-    if (gain > maxima_[d] && candidate.effect(normal.fit(draws_[d]))) maxima_[d] = gain;
+    const double held_out = normal.gain(draws_[d]);
+    if (!(held_out > maxima_[d])) continue;
+    const SmallVector fit = normal.fit(draws_[d]);
+    const double gain = held_out - candidate.prior_nats(fit);
+    if (gain > maxima_[d] && candidate.effect(fit)) maxima_[d] = gain;
   }
 }
 

@@ -19,18 +19,20 @@ struct SearchCandidate {
   Scale scale;
   std::vector<DesignColumn> columns;
   NormalEquations normal;
-  double gain = 0;         ///< held out, nats
+  double gain = 0;         ///< held out, nats, less prior_nats()
   SmallMatrix size;        ///< θᵀ size θ: mean square of what the columns add
   Structure structure{};   ///< of a structure, its functions left out: they are the columns
   double floor = 0;        ///< of a structure: the least root mean square that is an effect
   SmallVector fit{};       ///< (ΣA)⁻¹ Σ b
   std::size_t number = 0;  ///< among all that are tried
 
-  /// Whether parameters are an effect at all: at least the stated floor, of the right sign, and possible.
-  bool effect(const SmallVector& theta) const { return large_enough(theta) && !beyond_possible(theta); }
+  /// Whether parameters are an effect at all: at least the stated floor, of the right sign, and within hard ends.
+  bool effect(const SmallVector& theta) const { return large_enough(theta) && !beyond_ends(theta); }
   bool large_enough(const SmallVector& theta) const;
-  /// The first parameter that no vehicle can have, by its number; nothing of a structure.
-  std::optional<std::size_t> beyond_possible(const SmallVector& theta) const;
+  /// The first parameter beyond what its law can be, by its number; nothing of a structure.
+  std::optional<std::size_t> beyond_ends(const SmallVector& theta) const;
+  /// What such sizes cost beforehand, nats (Form::prior_nats); 0 of a structure.
+  double prior_nats(const SmallVector& theta) const;
 };
 
 /// Columns that stand beside a form's: free offsets, unless it is one itself, and what was accepted.

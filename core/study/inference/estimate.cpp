@@ -53,6 +53,13 @@ FamilyMember fitted(NormalEquations normal, const Form* shape, const Scale& scal
   return {shape, scale, std::move(normal), theta, SmallVector(jackknife(left)), height};
 }
 
+std::vector<LeftOut> by_flight(const NormalEquations& normal) {
+  std::vector<LeftOut> flights;
+  const auto nats = normal.gain_per_flight();
+  for (std::size_t f = 0; f < nats.size(); ++f) flights.push_back({nats[f], normal.fit_without(f)});
+  return flights;
+}
+
 using Objective = std::function<double(const std::vector<double>&)>;
 
 double evaluate(const std::vector<double>& x, std::vector<double>&, void* objective) {
@@ -139,7 +146,10 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
   cause.columns = cause.form->columns(windows, cause.scale);
   cause.theta = SmallVector::Ones(1);
   const NormalEquations own = evidence.normal(cause.columns, nuisance);
-  if (own.solvable) cause.gain = own.gain();
+  if (own.solvable) {
+    cause.gain = own.gain();
+    cause.flights = by_flight(own);
+  }
   const Eigen::VectorXd error =
       student_975(static_cast<double>(own.b.size()) - 1) * offset_error(evidence, nuisance, best[0], best[1]);
   cause.parameters = {{"x_m", best[0], best[0] - error[0], best[0] + error[0]},
@@ -280,6 +290,7 @@ void refine(const Evidence& evidence, Accepted& cause, const std::vector<DesignC
   cause.scale = best.scale;
   cause.theta = best.theta;
   cause.gain = best.normal.gain();
+  cause.flights = by_flight(best.normal);
   cause.columns = form.columns(family.windows, cause.scale);
   cause.parameters = family.parameters(cause.columns);
   if (family.own() > 1) {

@@ -88,13 +88,15 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
       if (!theirs.solvable || !ours.solvable || theirs.gain() < std::min(threshold, kRules.rival_rest * ours.gain()))
         continue;
       const SearchCandidate rival{&form, form.cause(), scale, {}, {}, 0, evidence.size(columns)};
-      if (!rival.effect(theirs.fit())) continue;
+      const SmallVector size = theirs.fit();
+      if (!rival.effect(size)) continue;
       // Two causes that explain different data are two causes, not rivals: a rival gains less once ours is known.
       std::vector<DesignColumn> with_ours = nuisance;
       with_ours.insert(with_ours.end(), own.columns.begin(), own.columns.end());
       const NormalEquations rest = evidence.normal(columns, with_ours);
       if (rest.solvable && rest.gain() > kRules.rival_rest * theirs.gain()) continue;
-      const auto [lead, error] = lead_over(ours, theirs);
+      auto [lead, error] = lead_over(ours, theirs);
+      lead += rival.prior_nats(size) - prior_nats_of(own);
       // Motor commands alone do not tell a damaged rotor from a weight near it, whichever fits better: only the line of
       // its rate does.
       if (own.form->motors_alone && form.motors_alone) {

@@ -2,6 +2,7 @@
 #include "core/study/inference/rules.hpp"
 
 #include "core/study/effects/effect_rules.hpp"
+#include "core/study/effects/prior_rules.hpp"
 #include "core/study/inference/rotors/rotor_rules.hpp"
 #include "core/study/windows/gates/window_rules.hpp"
 
@@ -12,6 +13,7 @@ std::vector<Rule> rules() {
   append_rules(told, kRotorRules);
   append_rules(told, kWindowRules);
   append_rules(told, kEffectRules);
+  append_rules(told, kPriors);
   return told;
 }
 

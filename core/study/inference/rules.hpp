@@ -123,8 +123,8 @@ struct Rules {
   Rule hovering{"hovering", 0.03, "m/s", "chosen: of the set-points' own motion; a lag of 0.1 s is 3 mm"};
   Rule least_shift{"least_shift", 0.002, "m",
                    "derived: a pose's error of 0.02 m (vehicle file) over the root of 100 windows"};
-  Rule refuted_shift{"refuted_shift", 0.5, "of the predicted shift",
-                     "derived: below it what was measured is nearer to no shift than to the predicted one"};
+  Rule kept_shift{"kept_shift", 0.5, "of the predicted shift",
+                  "derived: below it what was measured is nearer to no shift than to the predicted one"};
   Rule shift_interval{"shift_interval", 1, "of the predicted shift", "derived: wider, it holds both answers"};
   Rule fewest_shifted{"fewest_shifted", 3, "flights", "derived: one slope and a scatter"};
   Rule window_match{"window_match", 0.15, "s", "chosen: a window of 2 s moved by less holds 90 % of the same gusts"};

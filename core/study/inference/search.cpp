@@ -132,20 +132,24 @@ struct Beside {
   const std::vector<Known>& known;
 };
 
-/// The cause that gains most beside what is accepted, more than `led` nats, but is none that a vehicle can have.
-std::optional<Refused> impossible(const std::vector<SearchCandidate>& all, const Beside& beside, double threshold,
-                                  double led) {
+Refused refused(const Form& form, std::size_t k, double value) {
+  const Prior& prior = form.priors[k];
+  return {form.cause(), form.formula, form.parameters[k], value, prior.least, prior.most, prior.reason};
+}
+
+/// The cause that gains most beside what is accepted, more than `led` nats, but is beyond what its law can be.
+std::optional<Refused> beyond_its_law(const std::vector<SearchCandidate>& all, const Beside& beside, double threshold,
+                                      double led) {
   for (const auto& c : all) {
     if (c.gain <= std::max(led, threshold)) return std::nullopt;
     if (!c.form || is_known(c, beside.accepted)) continue;
-    const auto k = c.beyond_possible(c.fit);
+    const auto k = c.beyond_ends(c.fit);
     if (!k || !c.large_enough(c.fit)) continue;
     const auto whole = filled(c, beside.evidence, beside.columns);
     if (c.gain <= needed_gain(whole, beside.accepted, beside.known, threshold) ||
         !excludes_zero(whole.normal, whole.columns))
       continue;
-    return Refused{c.name, c.form->formula, c.form->parameters[*k], c.fit[static_cast<Eigen::Index>(*k)],
-                   c.form->possible[*k]};
+    return refused(*c.form, *k, c.fit[static_cast<Eigen::Index>(*k)]);
   }
   return std::nullopt;
 }
@@ -191,7 +195,7 @@ bool reaches_too_far(const Accepted& a, CauseSearchResult& result) {
   if (!a.form->reach || a.parameters.empty() || a.parameters.back().low <= a.form->reach->most) return false;
   const Reach& reach = *a.form->reach;
   result.refused.push_back(
-      {a.form->cause(), a.form->formula, a.form->scale_name, a.scale.value, {0, reach.most, reach.reason}});
+      {a.form->cause(), a.form->formula, a.form->scale_name, a.scale.value, 0, reach.most, reach.reason});
   SearchCandidate as_structure;
   as_structure.name = reach.regressor;
   as_structure.columns = a.columns;
@@ -202,18 +206,18 @@ bool reaches_too_far(const Accepted& a, CauseSearchResult& result) {
   return true;
 }
 
-/// What came out beyond what a vehicle can have, once averaged over the shapes, is refused; no interval holds it.
-void refuse_impossible(CauseSearchResult& result) {
+/// What came out beyond its law's ends, once averaged over the shapes, is refused; no interval holds it.
+void keep_within_ends(CauseSearchResult& result) {
   std::erase_if(result.accepted, [&](Accepted& a) {
-    const auto& possible = a.form->possible;
-    for (std::size_t k = 0; k < possible.size() && !a.form->displaces_map && k < a.parameters.size(); ++k) {
+    const auto& priors = a.form->priors;
+    for (std::size_t k = 0; k < priors.size() && !a.form->displaces_map && k < a.parameters.size(); ++k) {
       Estimate& e = a.parameters[k];
-      if (!possible[k].holds(e.value)) {
-        result.refused.push_back({a.form->cause(), a.form->formula, e.name, e.value, possible[k]});
+      if (!priors[k].holds(e.value)) {
+        result.refused.push_back(refused(*a.form, k, e.value));
         return true;
       }
-      e.low = std::max(e.low, possible[k].least);
-      e.high = std::min(e.high, possible[k].most);
+      e.low = std::max(e.low, priors[k].least);
+      e.high = std::min(e.high, priors[k].most);
     }
     return false;
   });
@@ -227,6 +231,10 @@ void refuse_impossible(CauseSearchResult& result) {
 }
 
 }  // namespace
+
+double prior_nats_of(const Accepted& a) {
+  return a.form->prior_nats({a.theta.data(), static_cast<std::size_t>(a.theta.size())});
+}
 
 CauseSearchResult search(const Evidence& start, const CauseSearchOptions& options) {
   CauseSearchResult result;
@@ -244,7 +252,7 @@ CauseSearchResult search(const Evidence& start, const CauseSearchOptions& option
     const Beside beside{evidence, result.accepted, accepted, options.known};
     const auto cause = best_of(step.named, beside, step.threshold);
     const auto structure = best_of(step.structures, beside, step.structure_threshold);
-    if (const auto no = impossible(step.named, beside, step.threshold, cause ? cause->gain : 0))
+    if (const auto no = beyond_its_law(step.named, beside, step.threshold, cause ? cause->gain : 0))
       result.refused.push_back(*no);
     if (structure && leads(*structure, cause, result.accepted)) {
       drop_means_of(structure->columns, structure->gain, result.accepted);
@@ -263,7 +271,7 @@ CauseSearchResult search(const Evidence& start, const CauseSearchOptions& option
   settle(evidence, result.accepted, result.threshold);
   for (const Accepted& a : std::exchange(result.accepted, {}))  // all estimates are settled now
     if (!reaches_too_far(a, result)) result.accepted.push_back(a);
-  refuse_impossible(result);
+  keep_within_ends(result);
   for (std::size_t i = 0; i < result.accepted.size(); ++i) find_rivals(evidence, result.accepted, i, result.threshold);
   return result;
 }

@@ -34,6 +34,12 @@ struct Rival {
   double behind_nats;  ///< gain of the accepted cause less the rival's
 };
 
+/// A flight, or what is left out with it: its share of the gain, nats, and θ without it.
+struct LeftOut {
+  double nats;
+  SmallVector theta;
+};
+
 struct Accepted {
   const Form* form;
   Scale scale;
@@ -43,7 +49,11 @@ struct Accepted {
   double gain;  ///< held out, nats, given the other accepted causes
   std::vector<Estimate> parameters;
   std::vector<Rival> rivals;
+  std::vector<LeftOut> flights = {};  ///< `gain` by flight; empty where none may be left out
 };
+
+/// What the size of a cause costs beforehand, nats (Form::prior_nats).
+double prior_nats_of(const Accepted& cause);
 
 struct UnknownStructure {
   std::string along;           ///< regressor; two, "x_m, y_m", if their products are meant
@@ -54,11 +64,11 @@ struct UnknownStructure {
   std::optional<double> hz;    ///< of a tone
 };
 
-/// A cause that would have led, but for a size that no vehicle can have.
+/// A cause that would have led, but for a size that its law cannot have.
 struct Refused {
   std::string name, form, parameter;
-  double value;
-  Possible possible;
+  double value, least, most;
+  std::string reason;
 };
 
 struct CauseSearchResult {

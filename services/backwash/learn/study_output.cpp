@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwash/learn/study_output.hpp"
 
+#include <cmath>
 #include <cstdio>
 
 #include "core/study/calibrate/calibration_rules.hpp"
@@ -32,6 +33,12 @@ Json to_json(const std::vector<study::ActingFlight>& flights, const std::vector<
   return all;
 }
 
+/// Two ends of a range; null: none.
+Json ends(double least, double most) {
+  const auto end = [](double at) { return std::isfinite(at) ? Json(at) : Json(); };
+  return Json::array({end(least), end(most)});
+}
+
 Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::vector<std::string>& logs) {
   const auto& found = cause.found;
   Json parameters = Json::object();
@@ -43,7 +50,12 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
     separate.push_back(
         {{"rival", s.rival}, {"manoeuvre", s.manoeuvre}, {"expected_nats", s.expected_nats.value_or(0)}});
   const auto& g = cause.gain;
-  const auto& a = cause.applied;
+  Json channels = Json::array();
+  for (const auto& c : g.channels)
+    channels.push_back({{"channel", study::channel_name(c.channel)},
+                        {"before", c.before},
+                        {"after", c.after},
+                        {"windows", c.windows}});
   Json json = {{"name", found.form->cause()},
                {"set", set},
                {"p", found.p},
@@ -55,21 +67,12 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
                  {"rmse_before", g.rmse_before},
                  {"rmse_after", g.rmse_after},
                  {"variance_coverage_before", g.coverage_before},
-                 {"variance_coverage_after", g.coverage_after}}},
-               {"applied",
-                {{"held_out_nats", a.nats},
-                 {"rmse_before", a.rmse_before},
-                 {"rmse_after", a.rmse_after},
-                 {"variance_coverage_before", a.coverage_before},
-                 {"variance_coverage_after", a.coverage_after},
-                 {"refused", a.refused}}},
-               {"hover_shift",
-                {{"predicted_m", cause.shift.predicted},
-                 {"measured_m", cause.shift.measured},
-                 {"slope", cause.shift.slope},
-                 {"ci95", {cause.shift.low, cause.shift.high}},
-                 {"refuted", cause.shift.refuted()}}},
+                 {"variance_coverage_after", g.coverage_after},
+                 {"channels", channels}}},
+               {"applied", {{"refused", cause.applied.refused}}},
+               {"positions", cause.positions},
                {"extrapolated", cause.extrapolated},
+               {"beforehand", {{"nats", -study::prior_nats_of(found)}, {"words", study::beforehand(found)}}},
                {"largest_flown", cause.largest_flown},
                {"odds", study::odds(g.held_out_nats)},
                {"change", to_json(study::remedy_of(cause, vehicle))},
@@ -79,6 +82,11 @@ Json to_json(const study::NamedCause& cause, const Vehicle& vehicle, const std::
   json["when"] = cause.when;
   json["in_flights"] = to_json(cause.flights, logs);
   return json;
+}
+
+Json to_json(const study::SteadyAnswer::Axes& s) {
+  return {{"predicted_m", s.predicted}, {"measured_m", s.measured}, {"left", s.left},
+          {"ci95", {s.low, s.high}},    {"decay_per_s", s.rate},    {"told", s.matters() && s.told()}};
 }
 
 void print_text(const char* of, const study::calibrate::HeightEffect& h) {
@@ -122,14 +130,15 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
                {"minimum_detectable", Json::object()}};
   for (const auto& [gate, count] : seen.gated_out) json["gated_out"][study::to_string(gate)] = count;
   for (const auto& cause : result.causes) json["causes"].push_back(to_json(cause, vehicle, logs));
+  json["steady_answer"] = {{"level", to_json(result.steady.axes[0])}, {"up", to_json(result.steady.axes[1])}};
   json["refused"] = Json::array();
   for (const auto& r : result.refused)
     json["refused"].push_back({{"name", r.name},
                                {"form", r.form},
                                {"parameter", r.parameter},
                                {"value", r.value},
-                               {"possible", {r.possible.least, r.possible.most}},
-                               {"why", r.possible.reason}});
+                               {"possible", ends(r.least, r.most)},
+                               {"why", r.reason}});
   for (const auto& u : result.unknown)
     json["unknown"].push_back({{"along", u.along},
                                {"of", u.group},
@@ -200,13 +209,12 @@ void print_text(const study::NamedCause& cause, const Vehicle& vehicle, const st
   for (const auto& f : cause.flights) std::printf(" %s", f.flight < logs.size() ? logs[f.flight].c_str() : "?");
   if (!cause.flights.empty()) std::printf("\n");
   if (!cause.applied.refused.empty()) std::printf("  does not join the model: %s\n", cause.applied.refused.c_str());
-  if (cause.shift.refuted())
-    std::printf(
-        "  the hovers refute its shift: %.2f [%.2f, %.2f] of what is predicted; if the loop has an integrator,\n"
-        "  set controller.velocity_integrator of the vehicle file\n",
-        cause.shift.slope, cause.shift.low, cause.shift.high);
+  for (const auto& c : cause.gain.channels)
+    std::printf("  %s: error %.4g before, %.4g after\n", study::channel_name(c.channel), c.before, c.after);
+  if (!cause.positions.empty()) std::printf("  positions refused: %s\n", cause.positions.c_str());
   for (const auto& e : cause.found.parameters)
     std::printf("  %s %.4g [%.4g, %.4g]\n", e.name.c_str(), e.value, e.low, e.high);
+  std::printf("  size: %s\n", study::beforehand(cause.found).c_str());
   if (!cause.extrapolated.empty()) std::printf("  extrapolated: %s\n", cause.extrapolated.c_str());
   std::printf("  what to change: %s\n", study::remedy_of(cause, vehicle).words.c_str());
   for (const auto& s : cause.separate_by) {
@@ -232,6 +240,8 @@ void print_text(const study::StudyResult& result, const study::Observations& see
   std::printf("%s: %zu flights, %zu windows\n", study::to_string(result.verdict), seen.flights, seen.windows.size());
   if (result.verdict == study::StudyVerdict::insufficient) std::printf("%s\n", study::too_few(seen).c_str());
   for (const auto& cause : result.causes) print_text(cause, vehicle, logs);
+  for (std::size_t k = 0; k < result.steady.axes.size(); ++k)
+    if (const auto text = study::steady_words(result.steady, k); !text.empty()) std::printf("%s\n", text.c_str());
   if (consequence) std::printf("%s\n", study::cost_sentence(*consequence).c_str());
   for (const auto& r : result.refused) std::printf("refused: %s\n", study::refusal(r).c_str());
   for (const auto& u : result.unknown)
@@ -255,16 +265,19 @@ void print_rules(bool json) {
     for (const auto& r : all_rules())
       all["rules"].push_back({{"name", r.name}, {"value", r.value}, {"unit", r.unit}, {"reason", r.reason}});
     for (const study::Form* f : study::catalogue()) {
-      Json possible = Json::object();
-      for (std::size_t k = 0; k < f->possible.size(); ++k) {
-        const auto& p = f->possible[k];
-        possible[f->parameters[k]] = {{"range", {p.least, p.most}}, {"why", p.reason}};
+      Json priors = Json::object();
+      for (std::size_t k = 0; k < f->priors.size(); ++k) {
+        const auto& p = f->priors[k];
+        priors[f->parameters[k]] = {{"typical", p.typical.value},
+                                    {"rule", p.typical.name},
+                                    {"range", ends(p.least, p.most)},
+                                    {"why", p.reason}};
       }
       all["forms"].push_back({{"effect", f->cause()},
                               {"form", f->formula},
                               {"least_rms", f->floor},
                               {"least_parameter", f->least},
-                              {"possible", possible}});
+                              {"priors", priors}});
     }
     return print(all);
   }
@@ -274,11 +287,13 @@ void print_rules(bool json) {
   std::printf("\nleast root mean square over the flown windows, least first parameter, of each form:\n");
   for (const study::Form* f : study::catalogue())
     std::printf("%-20s %7.3g %7.3g  %s\n", f->cause().c_str(), f->floor, f->least, f->formula.c_str());
-  std::printf("\nsizes beyond which a cause is refused by name:\n");
+  std::printf("\ntypical size of each parameter, and ends of its law:\n");
   for (const study::Form* f : study::catalogue())
-    for (std::size_t k = 0; k < f->possible.size(); ++k)
-      std::printf("%-20s %-16s %6.3g to %.3g: %s\n", f->cause().c_str(), f->parameters[k].c_str(), f->possible[k].least,
-                  f->possible[k].most, f->possible[k].reason.c_str());
+    for (std::size_t k = 0; k < f->priors.size(); ++k) {
+      const auto& p = f->priors[k];
+      std::printf("%-20s %-16s %6.3g, %.3g to %.3g  %s\n", f->cause().c_str(), f->parameters[k].c_str(),
+                  p.typical.value, p.least, p.most, p.reason.c_str());
+    }
 }
 
 }  // namespace backwash::services

@@ -28,41 +28,39 @@ Reach wash() {
 }
 
 Form pull() {
-  return {
-      .formula = "z push A exp(-(d - 0.3 m)/L), d the gap to the surface above",
-      .parameters = {"A_mps2"},
-      .possible =
-          {{0, 3, "a surface above pulls upward; 3 m/s² are 30 % of the weight, more than any rotor gains under one"}},
-      .reference = under,
-      .scale_name = "L_m",
-      .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
-      .reach = wash(),
-      .by_place = true,
-      .floor = 0.02,
-      .needs = {Source::ceiling},
-      .not_flown = not_under_one,
-      .columns =
-          [](const Windows& ws, const Scale& length) {
-            return std::vector{lifting(ws, [&](auto& at) { return near_ceiling(at.ceiling_gap, length.value); })};
-          },
-      .shapes = {{.formula = "z push A (0.3 m/d)^n",
-                  .parameters = {},
-                  .scale_name = "n",
-                  .scales = scales_of({1.0, 3.0}),
-                  .columns =
-                      [](const Windows& ws, const Scale& n) {
-                        return std::vector{lifting(ws, [&](auto& at) {
-                          return power_of_distance(at.ceiling_gap, kCeilingReference, n.value);
-                        })};
-                      }}},
-      .extend = extends(Law::push_under_surface),
-      .simulate = simulates(Law::push_under_surface)};
+  return {.formula = "z push A exp(-(d - 0.3 m)/L), d the gap to the surface above",
+          .parameters = {"A_mps2"},
+          .priors = {{kPriors.typical_push, 0, HUGE_VAL, "a surface above pulls upward"}},
+          .reference = under,
+          .scale_name = "L_m",
+          .scales = scales_of({0.08, 0.15, 0.3, 0.6}),
+          .reach = wash(),
+          .by_place = true,
+          .floor = 0.02,
+          .needs = {Source::ceiling},
+          .not_flown = not_under_one,
+          .columns =
+              [](const Windows& ws, const Scale& length) {
+                return std::vector{lifting(ws, [&](auto& at) { return near_ceiling(at.ceiling_gap, length.value); })};
+              },
+          .shapes = {{.formula = "z push A (0.3 m/d)^n",
+                      .parameters = {},
+                      .scale_name = "n",
+                      .scales = scales_of({1.0, 3.0}),
+                      .columns =
+                          [](const Windows& ws, const Scale& n) {
+                            return std::vector{lifting(ws, [&](auto& at) {
+                              return power_of_distance(at.ceiling_gap, kCeilingReference, n.value);
+                            })};
+                          }}},
+          .extend = extends(Law::push_under_surface),
+          .simulate = simulates(Law::push_under_surface)};
 }
 
 Form gusts() {
   return {.formula = "ln variance + B exp(-(d - 0.3 m)/L), d the gap to the surface above",
           .parameters = {"B_ln"},
-          .possible = {{-4, 4, "gusts of e^4, 55 times, the modelled variance are another model"}},
+          .priors = {{kPriors.typical_ln}},
           .reference = under,
           .scale_name = "L_m",
           .scales = scales_of({0.15, 0.3, 0.6}),

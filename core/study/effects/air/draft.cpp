@@ -21,7 +21,7 @@ Effect draft() {
   return {.name = "draft",
           .forms = {{.formula = "constant level push fixed to the world",
                      .parameters = {"x_mps2", "y_mps2"},
-                     .possible = {{-3, 3, "3 m/s² are a wind in which nobody flies indoors"}, {-3, 3, "as along x"}},
+                     .priors = {{kPriors.typical_push}, {kPriors.typical_push}},
                      .constant = true,
                      .floor = 0.02,
                      .columns =

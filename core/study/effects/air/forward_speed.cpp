@@ -64,7 +64,7 @@ Effect forward_speed() {
   return {.name = "forward_speed",
           .forms = {{.formula = "z push C (v/1 m/s)^2",
                      .parameters = {"C_mps2"},
-                     .possible = {{-3, 3, "a push of 3 m/s² is 30 % of the weight, at a walking pace"}},
+                     .priors = {{kPriors.typical_push}},
                      .reference = pace,
                      .floor = 0.02,
                      .columns =
@@ -75,7 +75,7 @@ Effect forward_speed() {
                      .simulate = simulates(Law::push_with_speed)},
                     {.formula = "ln variance + B (v/1 m/s)^n",
                      .parameters = {"B_ln"},
-                     .possible = {{-4, 4, "gusts of e^4, 55 times, the modelled variance are another model"}},
+                     .priors = {{kPriors.typical_ln}},
                      .reference = pace,
                      .scale_name = "n",
                      .scales = scales_of({1, 2}),

@@ -16,8 +16,7 @@ Effect ground_thrust() {
       .name = "ground_thrust",
       .forms = {{.formula = "z push A exp(-(h - 0.4 m)/L), h the height over the surface below",
                  .parameters = {"A_mps2"},
-                 .possible = {{-3, 3,
-                               "a push of 3 m/s² is 30 % of the weight, more than any rotor gains 0.4 m over a floor"}},
+                 .priors = {{kPriors.typical_push}},
                  .reference =
                      Reference{kSurfaceReference, "m over the surface", [](auto& w) { return w.around.height; }},
                  .scale_name = "L_m",

@@ -10,7 +10,7 @@ Effect heavy_tails() {
       .name = "heavy_tails",
       .forms = {{.formula = "ln kurtosis + K",
                  .parameters = {"K_ln"},
-                 .possible = {{0, 4, "55 times a Gaussian's kurtosis: not gusts, but a log with errors"}},
+                 .priors = {{kPriors.typical_ln, 0, HUGE_VAL, "bursts raise the kurtosis"}},
                  .constant = true,
                  .floor = 0.15,
                  .one_sided = true,

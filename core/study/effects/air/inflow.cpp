@@ -9,7 +9,7 @@ Effect inflow() {
   return {.name = "inflow",
           .forms = {{.formula = "z push -k v_z",
                      .parameters = {"k_per_s"},
-                     .possible = {{0, 5, "a climb takes thrust; 5 1/s would be half the weight at 1 m/s"}},
+                     .priors = {{kPriors.typical_rate, 0, HUGE_VAL, "a climb takes thrust"}},
                      .floor = 0.01,
                      .one_sided = true,
                      .needs = {Source::attitude, Source::thrust},  // a loop that is late looks like it

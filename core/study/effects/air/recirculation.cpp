@@ -29,7 +29,7 @@ Effect recirculation() {
   return {.name = "recirculation",
           .forms = {{.formula = "ln variance + B (1 - exp(-t/tau)), t since the flight's start",
                      .parameters = {"B_ln"},
-                     .possible = {{-4, 4, "gusts of e^4, 55 times, the modelled variance are another model"}},
+                     .priors = {{kPriors.typical_ln}},
                      .scale_name = "tau_s",
                      .scales = scales_of({8, 20, 50}),
                      .floor = 0.12,

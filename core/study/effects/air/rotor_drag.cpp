@@ -47,7 +47,7 @@ Effect rotor_drag() {
   return {.name = "rotor_drag",
           .forms = {{.formula = "push -k v, level",
                      .parameters = {"k_per_s"},
-                     .possible = {{-0.1, 2, "drag brakes; with 2 1/s a craft would stop within half a second"}},
+                     .priors = {{kPriors.typical_rate, 0, HUGE_VAL, "drag brakes"}},
                      .reference = Reference{1, "m/s", [](auto& w) { return w.speed; }},
                      .by_size = true,
                      .floor = 0.01,

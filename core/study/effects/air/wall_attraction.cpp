@@ -39,7 +39,7 @@ Effect wall_attraction() {
   return {.name = "wall_attraction",
           .forms = {{.formula = formula,
                      .parameters = {"A_mps2"},
-                     .possible = {{-3, 3, "a push of 3 m/s² tilts the craft by 17 degrees beside a wall"}},
+                     .priors = {{kPriors.typical_push}},
                      .reference = Reference{kSurfaceReference, "m from the wall", nearest},
                      .scale_name = "L_m",
                      .scales = lengths,

@@ -10,7 +10,7 @@ namespace {
 Form of_thrust() {
   return {.formula = "thrust follows its command tau later",
           .parameters = {"tau_s"},
-          .possible = {{0, 0.5, "a craft whose thrust lags by half a second does not hover"}},
+          .priors = {{kPriors.typical_delay, 0, HUGE_VAL, "rotors do not foresee their commands"}},
           .least = 0.01,
           .one_sided = true,
           .needs = {Source::attitude, Source::thrust, Source::setpoints},
@@ -28,7 +28,7 @@ Form of_thrust() {
 Form of_attitude() {
   return {.formula = "the attitude lags this much longer, level axes",
           .parameters = {"lag_s"},
-          .possible = {{-0.3, 0.5, "a craft whose attitude lags by half a second does not hover"}},
+          .priors = {{kPriors.typical_delay}},
           .constant = true,
           .least = 0.01,
           .needs = {Source::setpoints},

@@ -39,30 +39,29 @@ std::vector<SimulationTerm> by_voltage(const FittedForm& fitted, const Observati
 
 /// A lower voltage gives less thrust for the same command.
 Effect battery_sag() {
-  return {
-      .name = "battery_sag",
-      .forms = {{.formula = "thrust (1 - s (V0 - V)/Vm), V0 the highest and Vm the mean voltage flown",
-                 .parameters = {"s"},
-                 .possible = {{-4, 4, "thrust goes with the square of the voltage; twice that power is no battery"}},
-                 .floor = 0.01,
-                 .needs = {Source::battery, Source::thrust},
-                 .columns = sagging,
-                 .companions =
-                     [](const Windows& ws) { return std::vector{missing_thrust(ws, [](auto&) { return 1.0; })}; },
-                 .anchor = voltages,
-                 .extend = flown_range,
-                 .simulate = by_voltage}},
-      .axis = {"battery, V", false, [](auto& w) { return w.voltage; }},
-      .remedy =
-          [](auto&, auto&) {
-            return with_craft(
-                "Switch on the autopilot's compensation of the battery's voltage, or land before it has sagged.");
-          },
-      .manoeuvres = {
-          {"hover on a fresh battery and on a used one, the same spot and time of flight", [](WindowRow& w, double s) {
-             w.voltage *= s < 0.5 ? 1.0 : 0.9;
-             w.t = 30;
-           }}}};
+  return {.name = "battery_sag",
+          .forms = {{.formula = "thrust (1 - s (V0 - V)/Vm), V0 the highest and Vm the mean voltage flown",
+                     .parameters = {"s"},
+                     .priors = {{kPriors.typical_power}},
+                     .floor = 0.01,
+                     .needs = {Source::battery, Source::thrust},
+                     .columns = sagging,
+                     .companions =
+                         [](const Windows& ws) { return std::vector{missing_thrust(ws, [](auto&) { return 1.0; })}; },
+                     .anchor = voltages,
+                     .extend = flown_range,
+                     .simulate = by_voltage}},
+          .axis = {"battery, V", false, [](auto& w) { return w.voltage; }},
+          .remedy =
+              [](auto&, auto&) {
+                return with_craft(
+                    "Switch on the autopilot's compensation of the battery's voltage, or land before it has sagged.");
+              },
+          .manoeuvres = {{"hover on a fresh battery and on a used one, the same spot and time of flight",
+                          [](WindowRow& w, double s) {
+                            w.voltage *= s < 0.5 ? 1.0 : 0.9;
+                            w.t = 30;
+                          }}}};
 }
 
 }  // namespace backwash::study

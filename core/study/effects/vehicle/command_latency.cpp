@@ -9,7 +9,7 @@ Effect command_latency() {
   return {.name = "command_latency",
           .forms = {{.formula = "set-points act later by this, level axes",
                      .parameters = {"latency_s"},
-                     .possible = {{-0.5, 1, "no controller acts a second late, none acts before it is told"}},
+                     .priors = {{kPriors.typical_delay}},
                      .constant = true,
                      .least = 0.015,
                      .needs = {Source::setpoints},

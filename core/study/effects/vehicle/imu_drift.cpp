@@ -24,49 +24,47 @@ SimulationTerm drift(Kind kind, const FittedForm& fitted) {
 }
 
 Form with_time() {
-  return {
-      .formula = "accelerometer bias b t/100 s, fixed to the body",
-      .parameters = {"x_mps2_per_100s", "y_mps2_per_100s", "z_mps2_per_100s"},
-      .possible = {{-3, 3, "3 m/s² of bias is a broken accelerometer"}, {-3, 3, "as along x"}, {-3, 3, "as along x"}},
-      .reference = Reference{100, "s", [](auto& w) { return w.t; }},
-      .in_sensor = true,
-      .floor = 0.015,
-      .needs = {Source::attitude},
-      .columns = [](const Windows& ws, const Scale&) { return body_drift(ws, [](auto& w) { return w.t / 100; }); },
-      .companions = first_bias,
-      .shapes = {{.formula = "accelerometer bias b (t/100 s)^n, fixed to the body",
-                  .parameters = {},
-                  .scale_name = "n",
-                  .scales = scales_of({0.75, 4.0 / 3}),
-                  .columns =
-                      [](const Windows& ws, const Scale& n) {
-                        return body_drift(ws, [&](auto& w) { return std::pow(std::max(w.t, 0.0) / 100, n.value); });
-                      }}},
-      .extend = unknown_push,
-      .simulate = [](const FittedForm& fitted,
-                     const Observations&) { return std::vector{drift(Kind::sensor_drift_with_time, fitted)}; }};
+  return {.formula = "accelerometer bias b t/100 s, fixed to the body",
+          .parameters = {"x_mps2_per_100s", "y_mps2_per_100s", "z_mps2_per_100s"},
+          .priors = {{kPriors.typical_push}, {kPriors.typical_push}, {kPriors.typical_push}},
+          .reference = Reference{100, "s", [](auto& w) { return w.t; }},
+          .in_sensor = true,
+          .floor = 0.015,
+          .needs = {Source::attitude},
+          .columns = [](const Windows& ws, const Scale&) { return body_drift(ws, [](auto& w) { return w.t / 100; }); },
+          .companions = first_bias,
+          .shapes = {{.formula = "accelerometer bias b (t/100 s)^n, fixed to the body",
+                      .parameters = {},
+                      .scale_name = "n",
+                      .scales = scales_of({0.75, 4.0 / 3}),
+                      .columns =
+                          [](const Windows& ws, const Scale& n) {
+                            return body_drift(ws, [&](auto& w) { return std::pow(std::max(w.t, 0.0) / 100, n.value); });
+                          }}},
+          .extend = unknown_push,
+          .simulate = [](const FittedForm& fitted,
+                         const Observations&) { return std::vector{drift(Kind::sensor_drift_with_time, fitted)}; }};
 }
 
 Form with_temperature() {
-  return {
-      .formula = "accelerometer bias b (T - 25 C)/10 C, fixed to the body",
-      .parameters = {"x_mps2_per_10c", "y_mps2_per_10c", "z_mps2_per_10c"},
-      .possible = {{-3, 3, "3 m/s² of bias is a broken accelerometer"}, {-3, 3, "as along x"}, {-3, 3, "as along x"}},
-      .reference = Reference{25, "C", [](auto& w) { return w.temperature; }},
-      .in_sensor = true,
-      .floor = 0.015,
-      .needs = {Source::temperature, Source::attitude},
-      .columns = [](const Windows& ws,
-                    const Scale&) { return body_drift(ws, [](auto& w) { return (w.temperature - 25) / 10; }); },
-      .companions = first_bias,
-      .extend = unknown_push,
-      .simulate =
-          [](const FittedForm& fitted, const Observations& seen) {
-            auto term = drift(Kind::sensor_drift_with_temperature, fitted);
-            const Course course = mean_course(seen, &WindowRow::temperature);
-            term.value.insert(term.value.end(), {course.first, course.rate});
-            return std::vector{term};
-          }};
+  return {.formula = "accelerometer bias b (T - 25 C)/10 C, fixed to the body",
+          .parameters = {"x_mps2_per_10c", "y_mps2_per_10c", "z_mps2_per_10c"},
+          .priors = {{kPriors.typical_push}, {kPriors.typical_push}, {kPriors.typical_push}},
+          .reference = Reference{25, "C", [](auto& w) { return w.temperature; }},
+          .in_sensor = true,
+          .floor = 0.015,
+          .needs = {Source::temperature, Source::attitude},
+          .columns = [](const Windows& ws,
+                        const Scale&) { return body_drift(ws, [](auto& w) { return (w.temperature - 25) / 10; }); },
+          .companions = first_bias,
+          .extend = unknown_push,
+          .simulate =
+              [](const FittedForm& fitted, const Observations& seen) {
+                auto term = drift(Kind::sensor_drift_with_temperature, fitted);
+                const Course course = mean_course(seen, &WindowRow::temperature);
+                term.value.insert(term.value.end(), {course.first, course.rate});
+                return std::vector{term};
+              }};
 }
 
 }  // namespace

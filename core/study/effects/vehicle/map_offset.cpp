@@ -38,7 +38,7 @@ Effect map_offset() {
   return {.name = "map_offset",
           .forms = {{.formula = "ln variance as modelled at the position plus a level offset",
                      .parameters = {"share"},
-                     .possible = {{0, 3, "a share of what the map says there: three times of it is no offset"}},
+                     .priors = {{kPriors.typical_ln, 0, HUGE_VAL, "a share of what the map says there"}},
                      .scale_name = "offset",
                      .scales = tried_offsets(),
                      .integer_scale = true,

@@ -22,6 +22,11 @@ std::vector<DesignColumn> facing_rotors(const Windows& ws, const Scale& pairing)
   return columns;
 }
 
+/// The missing share of the thrust, 1 − 1/(1 + m), as m.
+double excess_of_mass(double missing) { return missing / (1 - missing); }
+/// Half of ln (1 + m)/(1 − m) as m.
+double share_of_pair(double half_ln) { return std::tanh(half_ln); }
+
 std::vector<SimulationTerm> needed_of_rotors(const FittedForm& fitted, const Observations&) {
   const auto& pair = kFacing[static_cast<std::size_t>(fitted.scale.value)];
   SimulationTerm term{SimulationTerm::Kind::rotor_needs, std::vector<double>(4, 0)};
@@ -39,20 +44,21 @@ Effect payload() {
   return {
       .name = "payload",
       .at_rotors = AtRotors::weight,
-      .forms = {{.formula = "thrust per mass (1 - m), m the relative excess of mass",
+      .forms = {{.formula = "thrust per mass / (1 + m), m the relative excess of mass",
                  .parameters = {"m"},
-                 .possible = {{-0.5, 0.5, "a craft of half or of twice its mass is another vehicle"}},
+                 .priors = {{kPriors.typical_share, -HUGE_VAL, 1, "no mass is infinite"}},
                  .constant = true,
                  .by_size = true,
                  .floor = 0.01,
                  .needs = {Source::thrust},
                  .columns = overweight,
                  .extend = flown_range,
-                 .simulate = simulates(SimulationTerm::Kind::thrust_share)},
+                 .simulate = simulates(SimulationTerm::Kind::thrust_share),
+                 .meanings = {excess_of_mass}},
                 {.formula = "an off-centre weight: rotors that face each other need (1 + m) and (1 - m) of the mean",
                  .parameters = {"m_first", "m_second"},
-                 .possible = {{-1, 1, "a rotor that needs none, or twice the mean, flies alone"},
-                              {-1, 1, "as m_first"}},
+                 .priors = {{kPriors.typical_share, -1, 1, "no rotor pulls down"},
+                            {kPriors.typical_share, -1, 1, "no rotor pulls down"}},
                  .scale_name = "pairing",
                  .scales = scales_of({0, 1, 2}),
                  .integer_scale = true,
@@ -61,7 +67,8 @@ Effect payload() {
                  .floor = 0.02,
                  .needs = {Source::motors},
                  .columns = facing_rotors,
-                 .simulate = needed_of_rotors}},
+                 .simulate = needed_of_rotors,
+                 .meanings = {share_of_pair, share_of_pair}}},
       .remedy = [](auto& fitted, auto& v) {
         if (fitted.form.motors_alone)
           return with_craft("Move the weight, or the battery, towards the middle of the craft.");

@@ -33,7 +33,7 @@ Effect propeller_damage() {
           .at_rotors = AtRotors::propeller,
           .forms = {{.formula = "one rotor needs (1 + d) of the others' thrust command",
                      .parameters = {"d"},
-                     .possible = {{0, 1, "a rotor that needs twice the command has none to spare"}},
+                     .priors = {{kPriors.typical_share, 0, HUGE_VAL, "damage takes thrust"}},
                      .scale_name = "rotor",
                      .scales = rotors(),
                      .integer_scale = true,
@@ -45,11 +45,11 @@ Effect propeller_damage() {
                      .columns = [](const Windows& ws,
                                    const Scale& rotor) { return std::vector{one_rotor(kMotor1, ws, rotor, true)}; },
                      .companions = lost_thrust,
-                     .simulate = needs_more},
+                     .simulate = needs_more,
+                     .meanings = {share_of_ln}},
                     {.formula = "one rotor needs (1 + d) of the others' thrust command and shakes at its rate",
                      .parameters = {"d", "P_ln"},
-                     .possible = {{0, 1, "a rotor that needs twice the command has none to spare"},
-                                  {-2, 20, "ln of a line's power over the noise"}},
+                     .priors = {{kPriors.typical_share, 0, HUGE_VAL, "damage takes thrust"}, {kPriors.typical_line}},
                      .scale_name = "rotor",
                      .scales = rotors(),
                      .integer_scale = true,
@@ -62,7 +62,8 @@ Effect propeller_damage() {
                            return std::vector{one_rotor(kMotor1, ws, rotor, true), one_rotor(kLine1, ws, rotor, false)};
                          },
                      .companions = lost_thrust,
-                     .simulate = needs_more_and_shakes}},
+                     .simulate = needs_more_and_shakes,
+                     .meanings = {share_of_ln, as_fitted}}},
           .remedy = [](auto& fitted, auto&) {
             return with_craft("Replace or re-glue the propeller of " + rotor_of(fitted) + ".");
           }};

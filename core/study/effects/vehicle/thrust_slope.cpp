@@ -23,23 +23,21 @@ Remedy steeper(const FittedForm& fitted, const Vehicle& v) {
 
 /// The thrust curve is steeper or shallower at hover than modelled.
 Effect thrust_slope() {
-  return {
-      .name = "thrust_slope",
-      .forms = {{.formula = "a change of the thrust command is worth (1 + s) of the modelled",
-                 .parameters = {"s"},
-                 .possible = {{-0.8, 2,
-                               "a curve that is flat at hover does not fly; thrust of the third power has 1 + s = 3"}},
-                 .least = 0.03,
-                 .needs = {Source::attitude, Source::thrust, Source::setpoints},
-                 .columns =
-                     [](const Windows& ws, const Scale&) {
-                       return std::vector{
-                           DesignColumn{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[1]; })},
-                                         {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[1]; })},
-                                         {kMeanZ, values(ws, [](auto& w) { return w.mean_gain[1]; })}}}};
-                     },
-                 .simulate = simulates(SimulationTerm::Kind::thrust_slope)}},
-      .remedy = steeper};
+  return {.name = "thrust_slope",
+          .forms = {{.formula = "a change of the thrust command is worth (1 + s) of the modelled",
+                     .parameters = {"s"},
+                     .priors = {{kPriors.typical_slope, -1, HUGE_VAL, "more command is no less thrust"}},
+                     .least = 0.03,
+                     .needs = {Source::attitude, Source::thrust, Source::setpoints},
+                     .columns =
+                         [](const Windows& ws, const Scale&) {
+                           return std::vector{
+                               DesignColumn{{{kThrustDelay, values(ws, [](auto& w) { return w.delay_gain[1]; })},
+                                             {kThrustSlope, values(ws, [](auto& w) { return w.slope_gain[1]; })},
+                                             {kMeanZ, values(ws, [](auto& w) { return w.mean_gain[1]; })}}}};
+                         },
+                     .simulate = simulates(SimulationTerm::Kind::thrust_slope)}},
+          .remedy = steeper};
 }
 
 }  // namespace backwash::study

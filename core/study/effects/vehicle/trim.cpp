@@ -11,7 +11,7 @@ Effect trim() {
   return {.name = "trim",
           .forms = {{.formula = "constant push fixed to the body",
                      .parameters = {"body_x_mps2", "body_y_mps2"},
-                     .possible = {{-3, 3, "3 m/s² are a tilt of 17 degrees that nobody saw"}, {-3, 3, "as along x"}},
+                     .priors = {{kPriors.typical_push}, {kPriors.typical_push}},
                      .constant = true,
                      .floor = 0.02,
                      .needs = {Source::attitude},

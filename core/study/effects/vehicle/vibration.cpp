@@ -31,7 +31,7 @@ Effect vibration() {
       .name = "vibration",
       .forms = {{.formula = "ln power at all rotors' rates + P",
                  .parameters = {"P_ln"},
-                 .possible = {{0, 20, "ln of a line's power over the noise: beyond, no accelerometer reads on"}},
+                 .priors = {{kPriors.typical_line, 0, HUGE_VAL, "a line stands over the noise"}},
                  .constant = true,
                  .floor = 0.25,
                  .one_sided = true,

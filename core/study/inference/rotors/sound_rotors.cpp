@@ -135,15 +135,4 @@ Accepted name_by_balance(Accepted cause, const Observations& rest, bool taken_ou
   return cause;
 }
 
-Accepted tell_shares(Accepted cause) {
-  for (std::size_t k = 0; k < cause.columns.size(); ++k) {
-    const Channel c = cause.columns[k].parts.front().channel;
-    if (c < kMotor1 || c > kRpm4) continue;
-    const bool pair = cause.columns[k].parts.size() == 2;
-    Estimate& e = cause.parameters[k];
-    for (double* x : {&e.value, &e.low, &e.high}) *x = pair ? std::tanh(*x) : std::expm1(*x);
-  }
-  return cause;
-}
-
 }  // namespace backwash::study

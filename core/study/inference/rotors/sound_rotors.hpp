@@ -46,8 +46,4 @@ YawBalance yaw_balance(const std::array<double, 4>& ln_thrust, double spread);
 /// without this cause.
 Accepted name_by_balance(Accepted cause, const Observations& seen, bool taken_out, double spread);
 
-/// Motor and rpm channels hold logarithms: parameters that were fitted there become the shares that their names say,
-/// e^θ − 1 of one rotor, tanh θ of two that face each other. −1 is a rotor that gives nothing.
-Accepted tell_shares(Accepted cause);
-
 }  // namespace backwash::study

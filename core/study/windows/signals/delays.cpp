@@ -38,6 +38,17 @@ std::vector<double> about_mean(SampleRange w, F value) {
   return x;
 }
 
+/// Thrust per mass beyond a hover's that the set-points ask for, m/s²: of a fast flight the tilt alone takes some.
+double asked_thrust(const Series& s, std::size_t i) {
+  return (s.a_nominal[i] + kGravity * Vec3::UnitZ()).norm() - kGravity;
+}
+
+/// How much of it acts upwards.
+double asked_up(const Series& s, std::size_t i) {
+  const Vec3 f = s.a_nominal[i] + kGravity * Vec3::UnitZ();
+  return asked_thrust(s, i) * f.z() / std::max(f.norm(), kWindowRules.no_attitude.value);
+}
+
 /// What a window says of a delay: its value, its design, and that of a longer lag of the attitude, each over √Σx².
 struct Late {
   double y;
@@ -99,21 +110,21 @@ std::optional<Late> command_delay(const Series& s, SampleRange w, int from, int 
 
 std::vector<ChannelValue> Delays::add(const Series& s, SampleRange w, std::size_t number, WindowRow& row) {
   std::vector<ChannelValue> values;
-  const auto nominal = [&](int axis) { return [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; }; };
+  const auto asked = [&s](std::size_t i) { return asked_thrust(s, i); };
   if (s.simulated_by_thrust) {
     // Instrument and design both come from the set-points alone: the logged thrust also answers the gusts, and a
     // design that shares their noise with the residual would be biased.
     // Their means alone are taken out: up and down once in 3 to 5 s, half of what was asked for is a window's trend.
     const auto r = about_mean(w, [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i] - s.a_sim[i]); });
-    const auto rate = about_mean(w, slope_at(s, nominal(2))), level = about_mean(w, nominal(2));
+    const auto rate = about_mean(w, slope_at(s, asked)), level = about_mean(w, asked);
     // A steeper curve adds a share of what was commanded; a first-order lag takes τ times the rate of what came of it.
     const auto flown = about_mean(w, [&](std::size_t i) { return s.thrust_acc[i]; });
     const auto along = [&](std::size_t i) { return s.R_WB[i].col(2).dot(s.a[i]); };
     const auto flown_rate = about_mean(w, slope_at(s, along));
     const Moment delay(rate), slope(level);
     ThrustMoments moments{number};
-    for (std::size_t i = w.begin; i < w.end; ++i) moments.mean[0] += s.a_nominal[i].z() / static_cast<double>(w.size());
-    moments.mean[1] = (s.a_nominal[w.end - 1].z() - s.a_nominal[w.begin].z()) / (s.t[w.end - 1] - s.t[w.begin]);
+    for (std::size_t i = w.begin; i < w.end; ++i) moments.mean[0] += asked_up(s, i) / static_cast<double>(w.size());
+    moments.mean[1] = (asked_up(s, w.end - 1) - asked_up(s, w.begin)) / (s.t[w.end - 1] - s.t[w.begin]);
     const bool late = delay.excited(kWindowRules.excited_rate), steep = slope.excited(kWindowRules.excited_level);
     if (late) {
       moments.delay = {delay.with(level), delay.with(rate)};
