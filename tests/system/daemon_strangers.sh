@@ -42,7 +42,7 @@ for how in "${hows[@]}"; do
   status
   joined=$EPOCHREALTIME
   for _ in $(seq 600); do [[ $(wc -l <"$work/took") -lt 2 ]] || break; sleep 0.1; done
-  kill "${more_pids[-1]}"
+  [[ $(wc -l <"$work/took") -eq 2 ]] && kill "${more_pids[-1]}" || die "$how: not all were announced: $(<"$work/took")"
   during=$(resident)
   status
   python3 - "$mode $how" "$work/took" "$before" "$during" "$begun" "$joined" "$(value state)" "$(value ticks_missed)" "$missed" "$(value parts_filtered)" <<'PYTHON' || die "$mode, $how"

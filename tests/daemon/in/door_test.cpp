@@ -35,6 +35,16 @@ TEST(Door, AFloodFromOneSocketKeepsNobodyElseOut) {
   EXPECT_LE(gate.door->living(gate.now_ns), Door::kOfSocket + 40u);
 }
 
+// The flood has ended, and its port was given to somebody else.
+TEST(Door, WhoGetsAPortFromWhichAFloodCameWaitsAMinute) {
+  for (const auto& [waits_s, heard] : {std::pair{30, false}, {61, true}}) {
+    Gate gate;
+    for (std::uint32_t n = 0; n < 10'000; ++n, gate.now_ns += 1'000'000) gate.lets_in(1000 + n, socket(3));
+    gate.rest(waits_s);
+    EXPECT_EQ(gate.lets_in(7, socket(3)), heard) << waits_s << " s";
+  }
+}
+
 // As long as its sockets are fewer than its announcements.
 TEST(Door, AFloodFromManySocketsOfAnAddressKeepsNobodyElseOut) {
   Gate gate;
