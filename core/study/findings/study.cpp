@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/study/findings/extend.hpp"
+#include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/when_it_acts.hpp"
 #include "core/study/findings/words.hpp"
 #include "core/study/inference/estimate.hpp"
