@@ -138,9 +138,10 @@ TEST(Structures, TheNullsMaximaAreThoseOfEveryCandidateInEveryDraw) {
     NullMaxima maxima(draws);
     std::size_t count = 0;
     each(evidence, {}, [&](SearchCandidate&& c) {
-      for (std::size_t d = 0; d < draws.size(); ++d)
-        if (const double gain = c.normal.gain(draws[d]); gain > expected[d] && c.effect(c.normal.fit(draws[d])))
-          expected[d] = gain;
+      for (std::size_t d = 0; d < draws.size(); ++d) {
+        const SmallVector fit = c.normal.fit(draws[d]);
+        if (c.effect(fit)) expected[d] = std::max(expected[d], c.normal.gain(draws[d]) - c.prior_nats(fit));
+      }
       maxima.add(c);
       ++count;
       // Between the floors of means (0.03) and of ln variances (0.2) of a structure; the outline has no columns to ask.
