@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // An estimator and a tf2 listener in one, through Fast DDS with types written by hand, for
 // tests/system/daemon_transforms.sh.
-//   fastdds_transforms DOMAIN map|odom|closure SECONDS
-// Sends the pose of a vehicle at rest until SECONDS after the first transform, or for kFound if none comes: in frame
-// map; in frame odom, whose place in the map is on rt/backwash/loop_closure; or that place alone. After it has ended it
-// listens for as long as kAfter. Of each transform on rt/tf, reliable and volatile as tf2 asks for it, a line: "FRAME >
-// CHILD: X Y Z yaw ANGLE, N a second, M after it, NEWEST to OLDEST s old"; N from the first to the last while poses
-// were sent: how long the processes took to find each other is no part of it.
+//   fastdds_transforms DOMAIN map|odom SECONDS FOUND
+// Sends the pose of a vehicle at rest for so long from the first transform on, for which it waits FOUND s: in frame
+// map, or in frame odom, whose place in the map is on rt/backwash/loop_closure. After it has ended it listens for as
+// long as kAfter. Of each transform on rt/tf, reliable and volatile as tf2 asks for it, a line: "FRAME > CHILD: X Y Z
+// yaw ANGLE, N a second, M after it, NEWEST to OLDEST s old"; N by the stamps, from the first to the last.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -21,7 +20,7 @@
 
 namespace {
 
-constexpr int kAfter = 2, kFound = 8;  // s
+constexpr int kAfter = 2;  // s
 // Of the vehicle in what the estimator calls its frame, and of odom in the map: x, y, z in m, yaw in rad.
 struct Place {
   double x, y, z, yaw;
@@ -31,7 +30,7 @@ constexpr Place kVehicle{1, 2, 0.16, 0.5}, kClosure{-2, 0.5, 0.25, 2};
 struct Transform {
   std::string frame, child;
   Place at;
-  double age;  // s, by the wall clock, at its arrival
+  double stamp, age;  // s, by the wall clock, and at its arrival
 };
 
 double now(auto clock) { return std::chrono::duration<double>(decltype(clock)::now().time_since_epoch()).count(); }
@@ -87,7 +86,8 @@ class TfType : public Type {
       Transform t{};
       double qx = 0, qy = 0, qz = 0, qw = 0;
       cdr >> s >> ns >> t.frame >> t.child >> t.at.x >> t.at.y >> t.at.z >> qx >> qy >> qz >> qw;
-      t.age = now(std::chrono::system_clock()) - s - 1e-9 * ns;
+      t.stamp = s + 1e-9 * ns;
+      t.age = now(std::chrono::system_clock()) - t.stamp;
       t.at.yaw = 2 * std::atan2(qz, qw);
       if (std::hypot(qx, qy) > 1e-9) t.frame += " (tilted)";
       all.push_back(t);
@@ -100,18 +100,20 @@ class TfType : public Type {
 
 struct Seen {
   Transform last;
+  double begun = 0, ended = 0;  // s, stamps while that was sent
   int during = 0, after = 0;
-  double first = 0, latest = 0;        // s, arrival while poses were sent
   double oldest = -1e9, newest = 1e9;  // s
+
+  double rate() const { return during > 1 ? (during - 1) / (ended - begun) : 0; }
 };
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) return 64;
+  if (argc != 5) return 64;
   const auto domain = static_cast<unsigned>(std::atoi(argv[1]));
   std::string what = argv[2], map = "map";
-  const int seconds = std::atoi(argv[3]);
+  const int seconds = std::atoi(argv[3]), found = std::atoi(argv[4]);
   auto* participant = fast::DomainParticipantFactory::get_instance()->create_participant(domain, local_only(domain));
   if (!participant) return 70;
   const auto topic = [&](fast::TopicDataType* made, const char* name) {
@@ -134,19 +136,19 @@ int main(int argc, char** argv) {
   if (what != "map") closure->write(&map);
   std::map<std::string, Seen> seen;
   auto due = std::chrono::steady_clock::now();
-  int until = 100 * kFound;
-  for (int n = 0; n < until + 100 * kAfter; ++n) {
-    const bool during = n < until;
-    if (during && what != "closure") odometry->write(&what);
+  int last = 100 * found;
+  for (int n = 0; n < last + 100 * kAfter; ++n) {
+    const bool during = n < last;
+    if (during) odometry->write(&what);
     std::vector<Transform> message;
     fast::SampleInfo info;
     while (tf->take_next_sample(&message, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK)
       for (const Transform& t : message) {
-        if (seen.empty()) until = std::min(until, n + 100 * seconds);
+        if (seen.empty() && during) last = n + 100 * seconds;
         Seen& s = seen[t.frame + " > " + t.child];
         s.last = t;
-        if (during) s.latest = now(std::chrono::steady_clock());
-        if (s.during == 0) s.first = s.latest;
+        if (during && s.during == 0) s.begun = t.stamp;
+        if (during) s.ended = t.stamp;
         ++(during ? s.during : s.after);
         s.oldest = std::max(s.oldest, t.age);
         s.newest = std::min(s.newest, t.age);
@@ -156,7 +158,6 @@ int main(int argc, char** argv) {
   }
   for (const auto& [name, s] : seen)
     std::printf("%s: %.3f %.3f %.3f yaw %.3f, %.1f a second, %d after it, %.1f to %.1f s old\n", name.c_str(),
-                s.last.at.x, s.last.at.y, s.last.at.z, s.last.at.yaw,
-                (s.during - 1) / std::max(1e-3, s.latest - s.first), s.after, s.newest, s.oldest);
+                s.last.at.x, s.last.at.y, s.last.at.z, s.last.at.yaw, s.rate(), s.after, s.newest, s.oldest);
   return 0;
 }
