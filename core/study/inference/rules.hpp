@@ -109,6 +109,7 @@ struct Rules {
   Rule fewest_a_side{"fewest_a_side", 2, "flights", "derived: one flight alone has no scatter of its own"};
   Rule level_scatter{"level_scatter", 2, "degrees of freedom",
                      "measured: so many taken off, equally spread values pass no more often than normal ones"};
+  Rule change_kinds{"change_kinds", 6, "1", "derived: as many as When has: each pays for all"};
   Rule change_share{"change_share", 1.0 / 3, "of accept_p",
                     "chosen: asked beside everything that all flights are asked"};
   Rule median_degrees{"median_degrees", 0.37, "of a value", "derived: the efficiency of a median deviation"};

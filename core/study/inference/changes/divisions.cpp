@@ -6,7 +6,6 @@
 #include <functional>
 #include <numeric>
 
-#include "core/study/inference/rules.hpp"
 #include "core/study/windows/signals/distributions.hpp"
 #include "core/types/quantile.hpp"
 
@@ -147,7 +146,7 @@ Expected expected(const std::vector<FlightValues>& amplitudes) {
     if (ratio > 0 && degrees > 0) ln.push_back(std::log(ratio) - digamma(degrees / 2) + std::log(degrees / 2));
   }
   const double n = static_cast<double>(ln.size());
-  if (n < 3) return {};
+  if (n < kRules.fewest_divided) return {};
   const double mean = std::accumulate(ln.begin(), ln.end(), 0.0) / n;
   double square = 0, own = 0, most = 0;
   for (const double x : ln) square += (x - mean) * (x - mean) / (n - 1);

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/study/inference/rules.hpp"
+
 /// Whether values of flights, in the order flown, lie on one level (docs/model.md section 8, "When").
 namespace backwash::study {
 
@@ -17,7 +19,7 @@ enum class When : std::uint8_t {
   growing,  ///< as much from each flight to the next
   moment    ///< from a moment on in each flight
 };
-inline constexpr double kWhens = 6;
+inline constexpr double kWhens = kRules.change_kinds;
 
 /// One row per exchangeable parameter (the two level axes, else one), a column per flight, and the mean square error of
 /// each column by the noise of its windows.
