@@ -5,14 +5,19 @@
 # What the emulated vehicle bears is two control periods: it is a process like any other, and hardware does not wait for one.
 readonly longest_stall_ms=40 says_nothing=75
 
-# stalls FILE: writes how long this machine let an ordinary process wait at most so far, ms, until it is ended.
+# stalls FILE: writes how long this machine let an ordinary process wait at most so far, ms, for its turn and for what it wrote to a
+# pseudo-terminal, until it is ended. The emulated link is one, and is carried by a worker of the kernel, which waits for its own turn.
 stalls() {
   exec python3 - "$1" <<'PYTHON'
-import sys, time
+import os, sys, time, tty
+link, end = os.openpty()
+tty.setraw(end)
 worst, due = 0.0, time.monotonic()
 while True:
     due = time.monotonic() + 0.005
     time.sleep(0.005)
+    os.write(link, b".")
+    os.read(end, 1)
     late = (time.monotonic() - due) * 1e3
     if late > worst:
         worst = late

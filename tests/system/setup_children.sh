@@ -49,6 +49,15 @@ said=$( (for n in $(seq 0 20); do echo "[$n/20] Building something"; done; echo 
 [[ $(wc -l <<<"$said") -eq 10 && $said == *"building: 2 of 20, about"*"building: 20 of 20, about 0 min 0 s left" ]] || die "progress: $said"
 
 source "$source_dir/services/bench/stalls.sh"
+stalls "$work/stall" &
+meter=$!
+for _ in $(seq 100); do [[ -s $work/stall ]] && break; sleep 0.1; done
+kill -STOP "$meter"
+sleep 0.3
+kill -CONT "$meter"
+for _ in $(seq 100); do (($(cat "$work/stall") >= 250)) && break; sleep 0.1; done
+(($(cat "$work/stall") >= 250)) || die "a stall of 0.3 s was told as $(<"$work/stall") ms"
+kill "$meter"
 stalls() { echo "$stood_still" >"$1"; exec sleep 60; } # in place of a machine that stands still
 flights=0
 flight() { # fails WANTED times
