@@ -40,7 +40,8 @@ assert all(a.number + 1 == b.number for a, b in zip(ticks, ticks[1:])), "a tick 
 wire = list(csv.DictReader(open(base + ".wire.csv")))
 def sent(message):
     frames = [(t, body[4]) for t, kind, body in raw_log.records(base + ".bwlog") if kind == raw_log.FRAME_OUT and raw_log.message_id(body) == message]
-    assert [int(row["sequence"]) for row in wire if row["id"] == str(message)] == [number for _, number in frames], message
+    arrived = [int(row["sequence"]) for row in wire if row["id"] == str(message)]
+    assert arrived == [number for _, number in frames[:len(arrived)]] and len(frames) - len(arrived) <= 1, message # both end at once
     return [t for t, _ in frames]
 masks = {row["type_mask"] for row in wire if row["id"] == str(raw_log.SETPOINT)}
 assert masks == {str(0x800)}, masks
