@@ -22,6 +22,14 @@ struct Asked {
   std::string topic, qos;
   dds_entity_t reader;
   int samples = 0;
+  double begun = 0, ended = 0;  // s, stamps of the first and the last
+
+  std::uint32_t matched() const {
+    dds_subscription_matched_status_t status{};
+    dds_get_subscription_matched_status(reader, &status);
+    return status.current_count;
+  }
+  double rate() const { return samples > 1 ? (samples - 1) / (ended - begun) : 0; }
 };
 
 dds_entity_t make_reader(dds_entity_t participant, dds_entity_t topic, const std::string& name) {
@@ -68,13 +76,19 @@ int main(int argc, char** argv) {
     const dds_entity_t topic = dds_create_topic(participant, *type, argv[n], nullptr, nullptr);
     all.push_back({argv[n], argv[n + 2], make_reader(participant, topic, argv[n + 2])});
   }
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(std::atoi(argv[2]));
-  while (std::chrono::steady_clock::now() < end) {
+  const auto wanted = std::chrono::seconds(std::atoi(argv[2]));
+  const auto begun = std::chrono::steady_clock::now();
+  auto end = begun + wanted;
+  for (auto now = begun; now < end; now = std::chrono::steady_clock::now()) {
+    if (now < begun + 3 * wanted && !std::ranges::all_of(all, &Asked::matched)) end = now + wanted;
     for (Asked& a : all) {
       void* sample = nullptr;
       dds_sample_info_t info;
       while (dds_take(a.reader, &sample, &info, 1, 1) == 1) {
-        a.samples += info.valid_data;
+        if (info.valid_data) {
+          a.ended = 1e-9 * static_cast<double>(info.source_timestamp);
+          if (a.samples++ == 0) a.begun = a.ended;
+        }
         dds_return_loan(a.reader, &sample, 1);
         sample = nullptr;
       }
@@ -82,12 +96,9 @@ int main(int argc, char** argv) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   const auto said = user_data(publications);
-  for (const Asked& a : all) {
-    dds_subscription_matched_status_t matched{};
-    dds_get_subscription_matched_status(a.reader, &matched);
-    std::printf("%s %s: matched %u, %d samples, user data %s\n", a.topic.c_str(), a.qos.c_str(), matched.current_count,
-                a.samples, said.contains(a.topic) ? said.at(a.topic).c_str() : "");
-  }
+  for (const Asked& a : all)
+    std::printf("%s %s: matched %u, %d samples, %.2f a second, user data %s\n", a.topic.c_str(), a.qos.c_str(),
+                a.matched(), a.samples, a.rate(), said.contains(a.topic) ? said.at(a.topic).c_str() : "");
   dds_delete(participant);
   return 0;
 }

@@ -40,13 +40,13 @@ types = t.types_of(pathlib.Path(sys.argv[2], "idl/ros2.idl").read_text())
 types |= t.types_of(pathlib.Path(sys.argv[2], "idl/backwash_msgs.idl").read_text())
 asked = sys.argv[4:]
 of = {name.rsplit("/", 1)[1]: re.sub(r"(\w+)::msg::dds_::(\w+)_", r"\1/msg/\2", type_) for name, type_ in zip(asked[::3], asked[1::3])}
-lines = [re.fullmatch(r"rt/(?:backwash/)?(\w+) (\w+): matched (\d+), (\d+) samples, user data (.*)", l.rstrip()) for l in open(sys.argv[1])]
+lines = [re.fullmatch(r"rt/(?:backwash/)?(\w+) (\w+): matched (\d+), (\d+) samples, ([\d.]+) a second, user data (.*)", l.rstrip()) for l in open(sys.argv[1])]
 assert len(lines) == len(asked) // 3 and all(lines), lines
-for topic, qos, matched, samples, said in (l.groups() for l in lines):
+for topic, qos, matched, samples, rate, said in (l.groups() for l in lines):
     assert matched == "1", (topic, qos, matched)
     assert said == f"typehash=RIHS01_{t.hash_of(of[topic], types)};", (topic, said)
-    least, most = {"status": (40, 90), "diagnostics": (4, 10), "battery": (4, 10)}.get(topic, (0, 1))
-    assert least <= int(samples) <= most, (topic, qos, samples)
+    wanted = {"status": 10, "diagnostics": 1, "battery": 1}.get(topic)
+    assert wanted * 0.5 <= float(rate) <= wanted * 1.12 if wanted else int(samples) <= 1, (topic, qos, samples, rate)
 print(f"{sys.argv[3]}: {len(lines)} readers matched, {len({l[1] for l in lines})} topics with their types' hashes")
 PYTHON
   done

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Who reads the daemon's topics through Fast DDS as it comes: a participant with every setting at its default.
 //   fastdds_reader DOMAIN SECONDS (TOPIC TYPE sensor|default|latched) …
-// By ROS 2's names: sensor is best effort, default reliable and volatile, latched reliable and transient local. Prints
-// a line for each, "TOPIC QOS: matched M, N samples, user data TEXT", the text as its writer said it in discovery.
+// By ROS 2's names: sensor is best effort, default reliable and volatile, latched reliable and transient local. Listens
+// for so long from when all are matched, for which it waits three times as long. Prints a line for each, "TOPIC QOS:
+// matched M, N samples, R a second, user data TEXT": R by their writer's stamps, the text as it said it in discovery.
 #include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -51,6 +53,14 @@ struct Asked {
   std::string topic, qos;
   fast::DataReader* reader;
   int samples = 0;
+  double begun = 0, ended = 0;  // s, stamps of the first and the last
+
+  bool matched() const {
+    fast::SubscriptionMatchedStatus status;
+    reader->get_subscription_matched_status(status);
+    return status.current_count > 0;
+  }
+  double rate() const { return samples > 1 ? (samples - 1) / (ended - begun) : 0; }
 };
 
 fast::DataReaderQos quality(const std::string& name) {
@@ -79,20 +89,26 @@ int main(int argc, char** argv) {
     if (!topic) topic = participant->create_topic(argv[n], type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
     all.push_back({argv[n], argv[n + 2], subscriber->create_datareader(topic, quality(argv[n + 2]))});
   }
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(std::atoi(argv[2]));
-  while (std::chrono::steady_clock::now() < end) {
+  const auto wanted = std::chrono::seconds(std::atoi(argv[2]));
+  const auto begun = std::chrono::steady_clock::now();
+  auto end = begun + wanted;
+  for (auto now = begun; now < end; now = std::chrono::steady_clock::now()) {
+    if (now < begun + 3 * wanted && !std::ranges::all_of(all, &Asked::matched)) end = now + wanted;
     char sample;
     fast::SampleInfo info;
     for (Asked& a : all)
       while (a.reader->take_next_sample(&sample, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK)
-        a.samples += info.valid_data;
+        if (info.valid_data) {
+          a.ended = 1e-9 * static_cast<double>(info.source_timestamp.to_ns());
+          if (a.samples++ == 0) a.begun = a.ended;
+        }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   for (const Asked& a : all) {
     fast::SubscriptionMatchedStatus matched;
     a.reader->get_subscription_matched_status(matched);
-    std::printf("%s %s: matched %d, %d samples, user data %s\n", a.topic.c_str(), a.qos.c_str(), matched.current_count,
-                a.samples, writers.user_data(a.topic).c_str());
+    std::printf("%s %s: matched %d, %d samples, %.2f a second, user data %s\n", a.topic.c_str(), a.qos.c_str(),
+                matched.current_count, a.samples, a.rate(), writers.user_data(a.topic).c_str());
   }
   std::fflush(stdout);
   std::_Exit(0);  // what discovery still tells is not listened to
