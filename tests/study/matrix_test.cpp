@@ -44,6 +44,17 @@ TEST(StudyMatrix, CountsASetWithTheTruthAsNeitherRightAloneNorWrong) {
   EXPECT_FALSE(told_of("trim", {{"trim"}}, {"z_m"}).right());
 }
 
+/// Both move the thrust, so with an offset of the mean beside a constant share the slope would be its by-product.
+TEST(StudyMatrix, TwoCausesOfOneThrustAreBothTold) {
+  const auto folder = std::filesystem::temp_directory_path() / ("study-pairs-" + std::to_string(::getpid()));
+  for (const char* other : {"payload", "battery_sag"}) {
+    const auto told = score({"", {other, "thrust_slope"}}, 4713, 1, 12, folder);
+    EXPECT_TRUE(told.in_sets()) << to_json(told);
+    EXPECT_FALSE(told.wrong_name()) << to_json(told);
+  }
+  std::filesystem::remove_all(folder);
+}
+
 TEST(StudyMatrix, ReferenceFlightsAreOfTheWorldsOwnCraft) {
   // Worlds of one seed have other rooms in other cells, and after another room the craft is drawn anew.
   const auto path = std::filesystem::temp_directory_path() / ("study-matrix-craft-" + std::to_string(::getpid()));

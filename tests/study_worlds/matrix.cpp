@@ -34,13 +34,26 @@ double size_of(const Options& options, std::uint64_t seed) {
   return std::exp(std::uniform_real_distribution(low, high)(rng));
 }
 
+/// The causes of "ceiling + payload"; empty: not such a name.
+std::vector<std::string> joined_causes(const std::string& name) {
+  static const std::string kAnd = " + ";
+  std::vector<std::string> causes;
+  for (std::size_t at = 0, end; at <= name.size(); at = end + kAnd.size()) {
+    end = std::min(name.find(kAnd, at), name.size());
+    causes.push_back(name.substr(at, end - at));
+    if (std::ranges::find(cause_names(), causes.back()) == cause_names().end()) return {};
+  }
+  return causes;
+}
+
 std::vector<MatrixCell> chosen_cells(const Options& options) {
   if (options.cells.empty()) return cells();
   std::vector<MatrixCell> chosen;
   for (const auto& name : options.cells) {
     const auto at = std::find_if(cells().begin(), cells().end(), [&](auto& c) { return c.name == name; });
-    if (at == cells().end()) throw backwash::services::UsageError("--cell: no cell '" + name + "'");
-    chosen.push_back(*at);
+    const auto causes = joined_causes(name);
+    if (at == cells().end() && causes.empty()) throw backwash::services::UsageError("--cell: no cell '" + name + "'");
+    chosen.push_back(at == cells().end() ? MatrixCell{name, causes} : *at);
   }
   return chosen;
 }
@@ -97,7 +110,7 @@ int main(int argc, char** argv) {
   app.add_option("--sizes", options.sizes, "in units of the effect-size table; two: log-uniform between")
       .expected(1, 2);
   app.add_option("--flights", options.flights).capture_default_str();
-  app.add_option("--cell", options.cells, "cells; default: all");
+  app.add_option("--cell", options.cells, "cells, or causes as \"ceiling + payload\"; default: all");
   app.add_option("--jobs", options.jobs).capture_default_str();
   app.add_option("--out", options.out, "JSON lines, appended to");
   app.add_option("--from", options.from, "JSON lines of earlier runs instead of new worlds");

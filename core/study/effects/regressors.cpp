@@ -88,7 +88,18 @@ Windows moved_by_itself(const Form& form, const Windows& windows, const Scale& s
   return moved;
 }
 
-std::vector<DesignColumn> offsets(const std::vector<DesignColumn>& columns, const Observations& seen) {
+namespace {
+/// Whether a column is constant in the one channel of an offset.
+bool is_offset(const DesignColumn& column, const std::vector<DesignColumn::Part>& offset) {
+  return offset.size() == 1 && std::ranges::any_of(column.parts, [&](const DesignColumn::Part& part) {
+           return part.channel == offset.front().channel && !part.x.empty() && part.x.front() != 0 &&
+                  std::ranges::count(part.x, part.x.front()) == std::ssize(part.x);
+         });
+}
+}  // namespace
+
+std::vector<DesignColumn> offsets(const std::vector<DesignColumn>& columns, const Observations& seen,
+                                  const std::vector<DesignColumn>& beside) {
   std::array<bool, kChannels> used{};
   for (const auto& column : columns)
     for (const auto& part : column.parts) used[part.channel] = true;
@@ -109,6 +120,9 @@ std::vector<DesignColumn> offsets(const std::vector<DesignColumn>& columns, cons
           {c, values(ws, [&](auto& w) { return kEffectRules.noise_unit / w.sigma[static_cast<int>(c - kVarX)]; })});
     free.push_back(std::move(noise));
   }
+  std::erase_if(free, [&](const DesignColumn& offset) {
+    return std::ranges::any_of(beside, [&](auto& b) { return is_offset(b, offset.parts); });
+  });
   return free;
 }
 

@@ -23,7 +23,9 @@ Windows moved_by(const Windows& windows, const std::vector<DesignColumn>& column
 Windows moved_by_itself(const Form& form, const Windows& windows, const Scale& scale, const Eigen::VectorXd& theta);
 
 /// Free offsets of the channels that columns move: constants, and for level means those fixed to the body too; in
-/// variance channels also the noise of the accelerometer, a constant over Σ.
-std::vector<DesignColumn> offsets(const std::vector<DesignColumn>& columns, const Observations& seen);
+/// variance channels also the noise of the accelerometer, a constant over Σ. A channel in which a column beside these
+/// is constant has its offset already: what that column does elsewhere would be free too with a second one.
+std::vector<DesignColumn> offsets(const std::vector<DesignColumn>& columns, const Observations& seen,
+                                  const std::vector<DesignColumn>& beside = {});
 
 }  // namespace backwash::study

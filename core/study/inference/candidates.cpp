@@ -27,7 +27,7 @@ bool fitted(SearchCandidate& c, const Evidence& evidence, const std::vector<Desi
 
 std::vector<DesignColumn> beside(const std::vector<DesignColumn>& columns, const std::vector<DesignColumn>& accepted,
                                  const Observations& seen) {
-  std::vector<DesignColumn> nuisance = offsets(columns, seen);
+  std::vector<DesignColumn> nuisance = offsets(columns, seen, accepted);
   nuisance.insert(nuisance.end(), accepted.begin(), accepted.end());
   return nuisance;
 }

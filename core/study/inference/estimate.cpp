@@ -182,7 +182,7 @@ struct Family {
 
   NormalEquations normal_at(const Form& shape, const Scale& at) const {
     auto columns = shape.columns(windows, at);
-    auto nuisance = shape.constant ? std::vector<DesignColumn>{} : offsets(columns, evidence.seen());
+    auto nuisance = shape.constant ? std::vector<DesignColumn>{} : offsets(columns, evidence.seen(), others);
     if (shapes[0].by_size) nuisance.push_back(without_variances(columns[0]));
     const auto open = companions(shapes[0], evidence.seen());
     nuisance.insert(nuisance.end(), open.begin(), open.end());

@@ -33,21 +33,6 @@ bool share_a_channel(const std::vector<DesignColumn>& a, const std::vector<Desig
   });
 }
 
-bool error_of_form(const Form& form, const std::vector<DesignColumn>& columns, double gain,
-                   const std::vector<Accepted>& accepted, const Evidence& evidence, std::size_t itself) {
-  for (std::size_t i = 0; i < accepted.size(); ++i) {
-    if (i == itself || gain > kRules.form_error * accepted[i].gain) continue;
-    if (!share_a_channel(columns, accepted[i].columns)) continue;
-    std::vector<Accepted> others;
-    for (std::size_t k = 0; k < accepted.size(); ++k)
-      if (k != i && k != itself) others.push_back(accepted[k]);
-    const auto beside = nuisance_of(form, columns, columns_of(others, evidence.seen()), evidence.seen());
-    const NormalEquations alone = evidence.normal(columns, beside);
-    if (alone.solvable && gain < kRules.rival_rest * alone.gain()) return true;
-  }
-  return false;
-}
-
 /// Σ and standard error of the sum of per-flight differences.
 Lead lead_over(const NormalEquations& a, const NormalEquations& b) {
   const auto ga = a.gain_per_flight(), gb = b.gain_per_flight();
@@ -81,7 +66,7 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
       both.insert(both.end(), columns.begin(), columns.end());
       std::vector<DesignColumn> nuisance = others;
       if (!form.constant && !own.form->constant) {
-        const auto free = offsets(both, evidence.seen());
+        const auto free = offsets(both, evidence.seen(), others);
         nuisance.insert(nuisance.end(), free.begin(), free.end());
       }
       const NormalEquations theirs = evidence.normal(columns, nuisance), ours = evidence.normal(own.columns, nuisance);

@@ -16,11 +16,6 @@ bool dynamic(const std::vector<DesignColumn>& columns);
 
 bool share_a_channel(const std::vector<DesignColumn>& a, const std::vector<DesignColumn>& b);
 
-/// Whether a cause of this gain beside the accepted ones is what the error of the form of one of them looks like: it
-/// lost more than half of its gain to that one, and what is left is little beside it. `itself`: its own number.
-bool error_of_form(const Form& form, const std::vector<DesignColumn>& columns, double gain,
-                   const std::vector<Accepted>& accepted, const Evidence& evidence, std::size_t itself = SIZE_MAX);
-
 /// Nats by which one set of columns leads another over the flights, and the standard error of that sum.
 struct Lead {
   double nats, error;

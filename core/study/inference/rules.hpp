@@ -31,8 +31,6 @@ struct Rules {
   Rule least_share{
       "least_share", 0.08, "of an accepted gain",
       "chosen: the error of an accepted form gains less (docs/measurements/confusion.md, two causes, has the price)"};
-  Rule repair_share{"repair_share", 0.25, "of an accepted gain",
-                    "chosen: delays and slopes share one moment, so a form's error is larger there"};
   Rule left_share{"left_share", 1, "of an accepted gain",
                   "derived: the error of a form is smaller than what it explains"};
   Rule left_of_constant{"left_of_constant", 0.5, "of an accepted gain",
@@ -47,8 +45,6 @@ struct Rules {
   Rule rival_rest{"rival_rest", 0.5, "of a gain", "chosen: what keeps more than half of its gain is a second cause"};
   Rule rival_share{"rival_share", 0.3, "of a gain",
                    "measured: of two columns that go together at 0.94 the wrong one has 0.70 to 0.77 of the gain"};
-  Rule form_error{"form_error", 0.25, "of an accepted gain",
-                  "chosen: what lost more than half of its gain to a cause is the error of that one's form below this"};
   Rule beyond_flown{"beyond_flown", 1.25, "1",
                     "chosen: a reference farther than a quarter outside of what was flown is an extrapolation"};
   // Scatter

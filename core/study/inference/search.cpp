@@ -32,11 +32,9 @@ unsigned disturbs(const std::vector<DesignColumn>& columns) {
 }
 
 /// Gain that a further cause needs beside one that has `gain`: a share of it where it might be the error of that one's
-/// form, a larger one where it repairs it in the same moments of the thrust's or the commands' delay.
+/// form.
 double needed_beside(const SearchCandidate& candidate, const std::vector<DesignColumn>& columns, double gain) {
-  if (!(disturbs(columns) & disturbs(candidate.columns))) return 0;
-  const bool repairs = dynamic(columns) && dynamic(candidate.columns);
-  return gain * (repairs ? kRules.repair_share : kRules.least_share);
+  return disturbs(columns) & disturbs(candidate.columns) ? kRules.least_share * gain : 0;
 }
 
 /// Gain that a further cause needs beside the accepted ones and those that the model holds.
@@ -67,8 +65,7 @@ void settle(const Evidence& evidence, std::vector<Accepted>& accepted, double th
       const auto& a = accepted[i];
       const NormalEquations n = evidence.normal(
           a.columns, nuisance_of(*a.form, a.columns, columns_of(accepted, evidence.seen(), i), evidence.seen()));
-      double gain = n.solvable ? n.gain() : 0;
-      if (error_of_form(*a.form, a.columns, gain, accepted, evidence, i)) gain = std::min(gain, 0.0);
+      const double gain = n.solvable ? n.gain() : 0;
       if (gain < least) {
         least = gain;
         weakest = i;
@@ -161,7 +158,6 @@ std::optional<SearchCandidate> best_of(const std::vector<SearchCandidate>& all, 
     if (is_known(c, beside.accepted) || !c.effect(c.fit)) continue;
     auto whole = filled(c, beside.evidence, beside.columns);
     if (c.gain <= needed_gain(whole, beside.accepted, beside.known, threshold)) continue;
-    if (c.form && error_of_form(*c.form, whole.columns, c.gain, beside.accepted, beside.evidence)) continue;
     if (!c.form || excludes_zero(whole.normal, whole.columns)) return whole;
   }
   return std::nullopt;
