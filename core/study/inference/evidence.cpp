@@ -272,7 +272,7 @@ DesignColumn Evidence::residual(const std::vector<DesignColumn>& fitted) const {
 void Evidence::whiten(const std::vector<DesignColumn>& accepted) {
   scatter_.fill({1, 0, 0});
   tilt_ = 0;
-  std::vector<DesignColumn> columns = offsets(accepted, *seen_, accepted);
+  std::vector<DesignColumn> columns = offsets(accepted, *seen_);
   columns.insert(columns.end(), accepted.begin(), accepted.end());
   const DesignColumn rest = residual(columns);
   const auto scatter_of = [&](const DesignColumn::Part& r) {
@@ -290,7 +290,7 @@ void Evidence::whiten(const std::vector<DesignColumn>& accepted) {
 std::vector<double> Evidence::ln_likelihood(const std::vector<DesignColumn>& accepted) const {
   DesignColumn every;
   for (std::size_t c = kMeanX; c <= kVarZ; ++c) every.parts.push_back({static_cast<Channel>(c), {}});
-  std::vector<DesignColumn> columns = offsets({every}, *seen_, accepted);
+  std::vector<DesignColumn> columns = offsets({every}, *seen_);
   columns.insert(columns.end(), accepted.begin(), accepted.end());
   std::vector<DesignColumn> rest{residual(columns)};
   if (tilt_ > 0) rest.insert(rest.begin(), tilts_.begin(), tilts_.end());
