@@ -43,11 +43,11 @@ Added held_out(const StudyResult& result, const Observations& seen) {
             to[i] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
         }
     }
-    const auto open = companions(*cause.found.form, seen);
-    for (std::size_t k = 0; k < std::min(open.size(), cause.applied.beside.size()); ++k)
-      for (const auto& part : open[k].parts)
-        for (std::size_t i = 0; i < part.x.size() && part.channel <= kMeanZ; ++i)
-          added.mean[part.channel][i] += cause.applied.beside[k] * part.x[i];
+    auto open = companions(*cause.found.form, seen);
+    open.resize(std::min(open.size(), cause.applied.beside.size()));
+    each_value(open, cause.applied.beside, [&](Channel c, std::size_t i, double x) {
+      if (c <= kMeanZ) added.mean[c][i] += x;
+    });
   }
   return added;
 }
