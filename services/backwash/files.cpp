@@ -11,6 +11,9 @@
 #include <set>
 #include <stdexcept>
 
+#include <toml++/toml.h>
+
+#include "core/config/builtin_files.hpp"
 #include "core/config/config.hpp"
 #include "core/config/simulation_terms.hpp"
 #include "core/files/read_file.hpp"
@@ -146,19 +149,29 @@ void check_outputs(const std::vector<std::string>& paths, bool force) {
 
 namespace {
 
-/// Lets `write` write a file beside `path`, which takes its place when it is whole; a device is written to itself.
-void write_whole(const std::string& path, bool force, const std::function<bool(const std::string& to)>& write) {
+/// Lets `write` write a file beside `path`, which takes its place when it is whole and `refusal` is empty; a device is
+/// written to itself.
+void write_whole(const std::string& path, bool force, const std::function<bool(const std::string& to)>& write,
+                 const ReadBack& refusal = {}) {
   check_output(path, force);
   std::error_code wrong;
   const bool device = std::filesystem::exists(path, wrong) && !std::filesystem::is_regular_file(path, wrong);
   const std::string name = device ? path : std::filesystem::weakly_canonical(path, wrong).string();  // a link stays
-  const std::string to = device ? path : name + ".part-" + std::to_string(::getpid());
+  const std::string part = ".part-" + std::to_string(::getpid());
+  const auto beside = device ? std::filesystem::temp_directory_path() / part : std::filesystem::path(name + part);
+  const std::string to = device && !refusal ? path : beside.string();
   wrong.clear();
   const bool whole = write(to);
-  if (whole && !device) std::filesystem::rename(to, name, wrong);
-  if (whole && !wrong) return;
-  if (!device) std::filesystem::remove(to, wrong);
-  throw Failure(kInputOutput, path + ":1: cannot be written to its end; free some space");
+  std::string why = whole && refusal ? refusal(to) : "";
+  bool good = whole && why.empty();
+  if (good && !device) std::filesystem::rename(to, name, wrong);
+  if (good && device && to != path) good = static_cast<bool>(std::ofstream(path) << std::ifstream(to).rdbuf());
+  std::error_code gone;
+  if (to != path) std::filesystem::remove(to, gone);
+  if (good && !wrong) return;
+  if (why.empty()) throw Failure(kInputOutput, path + ":1: cannot be written to its end; free some space");
+  if (why.starts_with(to)) why.erase(0, to.size());
+  throw Failure(kBadData, path + (why.starts_with(":") ? "" : ":1: ") + why + "; it is not written");
 }
 
 }  // namespace
@@ -172,22 +185,46 @@ void write_stream(const std::string& path, bool force, const std::function<void(
   });
 }
 
-void write_file(const std::string& path, const std::string& content, bool force) {
-  write_stream(path, force, [&](std::ostream& file) { file << content; });
+void write_file(const std::string& path, const std::string& content, bool force, const ReadBack& refusal) {
+  const auto write = [&](const std::string& to) {
+    std::ofstream file(to, std::ios::binary);
+    file << content;
+    file.close();
+    return file.good();
+  };
+  write_whole(path, force, write, refusal);
 }
 
-void write_model_file(const std::string& path, const std::string& content, bool force) {
-  const auto tried =
-      std::filesystem::temp_directory_path() / ("backwash-" + std::to_string(::getpid()) + ".model.toml");
-  write_file(tried, content, true);
-  const auto model = config::load_model(tried);
-  const auto terms = config::load_simulation(tried);
-  std::filesystem::remove(tried);
-  std::string why = !model ? model.error().message : !terms ? terms.error().message : "";
-  if (why.empty()) return write_file(path, content, force);
-  if (why.starts_with(tried.string())) why.erase(0, tried.string().size());
-  throw Failure(kBadData, path + (why.starts_with(":") ? "" : ":1: ") + why +
-                              "; it is not written: the flights do not determine this number (see its interval)");
+namespace {
+constexpr const char* kUndetermined = "; the flights do not determine this number (see its interval)";
+}  // namespace
+
+std::string model_refusal(const std::string& path) {
+  const auto model = config::load_model(path);
+  const auto terms = config::load_simulation(path);
+  const std::string why = !model ? model.error().message : !terms ? terms.error().message : "";
+  return why.empty() ? "" : why + kUndetermined;
+}
+
+std::string vehicle_refusal(const std::string& path, const std::string& vehicle) {
+  toml::table whole;
+  if (vehicle.starts_with("builtin:")) {
+    const std::string name = vehicle.substr(std::string("builtin:").size()) + ".vehicle.toml";
+    whole = toml::parse(std::ranges::find(config::builtin_files(), name, &config::BuiltinFile::name)->text);
+  } else {
+    whole = toml::parse_file(vehicle);  // load_vehicle has accepted it
+  }
+  auto& controller = *whole["controller"].as_table();
+  controller.erase("px4");
+  const auto proposal = toml::parse_file(path);
+  for (const auto& [key, value] : *proposal["controller"].as_table()) controller.insert_or_assign(key, value);
+  const auto together = std::filesystem::path(path + ".whole");
+  std::ofstream(together) << whole;
+  const auto read = config::load_vehicle(together);
+  std::filesystem::remove(together);
+  if (read) return "";
+  const auto key = read.error().message.find(" key '");  // its line is not the proposal's
+  return path + ":1:" + read.error().message.substr(std::min(key, read.error().message.size())) + kUndetermined;
 }
 
 void write_log(const std::string& path, const log::FlightLog& log, bool force) {

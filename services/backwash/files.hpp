@@ -55,12 +55,16 @@ std::string model_of(const std::string& vehicle, const std::string& model);
 void check_output(const std::string& path, bool force);
 /// The same of all that one call writes; throws Failure 64 where two of them are one file.
 void check_outputs(const std::vector<std::string>& paths, bool force);
+/// What the reader of a file says against it: PATH:LINE: what is wrong and what would be right. Empty: it was read.
+using ReadBack = std::function<std::string(const std::string& path)>;
 /// Writes a whole file; one that is replaced stays until the new one is complete. Throws Failure 73 (exists, cannot be
-/// created) or 74 (cannot be written).
-void write_file(const std::string& path, const std::string& content, bool force);
-/// write_file() of a model that was read back before: what load_model or load_simulation refuses is not written. Throws
-/// Failure 65 with the key and what it holds too.
-void write_model_file(const std::string& path, const std::string& content, bool force);
+/// created) or 74 (cannot be written). A `refusal` is asked of the file that was written, before it takes its name:
+/// throws Failure 65 with what it says.
+void write_file(const std::string& path, const std::string& content, bool force, const ReadBack& refusal = {});
+/// Why no program would read this model file, with key and value.
+std::string model_refusal(const std::string& path);
+/// Why no program would read `vehicle` with the table [controller] of the file in place of its own.
+std::string vehicle_refusal(const std::string& path, const std::string& vehicle);
 /// The same by what `write` puts onto a stream, which is not held in memory.
 void write_stream(const std::string& path, bool force, const std::function<void(std::ostream&)>& write);
 /// The same of a flight log.

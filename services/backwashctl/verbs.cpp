@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "core/config/route_file.hpp"
 #include "services/backwashctl/answer.hpp"
 #include "services/backwashctl/preflight.hpp"
-#include "services/backwashctl/route.hpp"
 #include "services/backwashctl/status_output.hpp"
 #include "services/command_line/exit_code.hpp"
 #include "services/command_line/words.hpp"
@@ -255,14 +255,14 @@ int Verbs::go_to() {
 }
 
 int Verbs::follow() {
-  const auto route = read_route(route_);
+  const auto route = config::read_route(route_);
   if (!route) {
     services::say_error("backwashctl follow", route.error().message);
-    return route.error().code;
+    return route.error().kind == config::ConfigError::Kind::not_found ? kNoInput : kBadData;
   }
-  waypoints_ = waypoints_of(*route);
-  const auto verb =
-      has_headings(*route) ? backwash_msgs_msg_dds__COMMAND_FOLLOW_FACING : backwash_msgs_msg_dds__COMMAND_FOLLOW;
+  waypoints_ = config::waypoints_of(*route);
+  const auto verb = config::has_headings(*route) ? backwash_msgs_msg_dds__COMMAND_FOLLOW_FACING
+                                                 : backwash_msgs_msg_dds__COMMAND_FOLLOW;
   return command("follow", verb, Vec3::Zero(), rests_at(route->back().p_W));
 }
 

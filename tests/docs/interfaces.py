@@ -199,14 +199,14 @@ def check_tables(root: pathlib.Path, text: str) -> None:
     """The columns of every table that a program writes are somewhere in the page, as the code's first line names them."""
     named = {part for q in quoted(text) for part in re.findall(r"\w+", q)}
     found = 0
-    for file in sorted((root / "services").rglob("*.[ch]pp")):
+    for file in sorted([*(root / "services").rglob("*.[ch]pp"), *(root / "core/config").rglob("*.[ch]pp")]):
         code = re.sub(r'"\s*"', "", file.read_text())  # one text over several lines
         for line in re.findall(r'"(\w+(?:,\w+){3,})(?:\\n|")', code):
             found += 1
             columns = {re.sub(r"^(.*_|[va]?)[yz](?=_m|$)", r"\1x", c) if c not in named else c for c in line.split(",")}
             wrong.extend(f"{file.relative_to(root)}: the column {c} is not documented" for c in sorted(columns - named))
     if found < 3:
-        wrong.append(f"only {found} tables were found in services")
+        wrong.append(f"only {found} tables were found in services and core/config")
 
 
 # --- DDS and MAVLink -------------------------------------------------------------------------------------------------

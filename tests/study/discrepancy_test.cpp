@@ -186,7 +186,7 @@ TEST(Study, AnExtendedModelMovesHoverSetsUnderTheCeilingAndKeepsMoreSamplesInsid
   ASSERT_TRUE(vehicle) << vehicle.error().message;
   const auto grid = backwash::map::load_map((folder() / "map.bt").string());
   ASSERT_TRUE(grid);
-  const auto c = consequence(result, seen, model, *vehicle, &*grid);
+  const auto c = consequence(result, seen, model, *vehicle, std::vector(seen.flights, &*grid));
   ASSERT_TRUE(c.before.hover && c.after.hover);
   EXPECT_EQ(c.before.hover->shift_95, 0);
   EXPECT_GT(c.after.hover->shift_95, 0.01);

@@ -42,11 +42,29 @@ import json
 told = json.load(open("room.json"))
 assert next(iter(told)) == "map_shares" and told["flights"] == 1 and [left["log"] for left in told["left_out"]] == ["two1.csv"]
 wrong, right = told["map_shares"]
-assert wrong["inside"] > 0.1 and wrong["outside"] > 0.1 and right == {"log": "four2.csv", "inside": 0, "too_near": 0, "outside": 0}
+assert wrong["inside"] > 0.1 and wrong["outside"] > 0.1 and right == {"log": "four2.csv", "map": "builtin:parallel-walls-4m", "inside": 0, "too_near": 0, "outside": 0}
 PYTHON
 status=0
 "$backwash" calibrate --map builtin:parallel-walls-1m --log two1.csv --vehicle $quad --judge >log 2>stderr || status=$?
 [[ $status == 65 ]] && grep -q 'two1.csv:1: lies where the map lets no craft be: .*first at t_s' stderr || die "another room alone: exit $status, $(cat stderr)"
+# A study takes several maps in the same way, each flight judged by its own, from logs or from rows.
+rooms=(--vehicle $quad --map builtin:parallel-walls-2m --log two1.csv two2.csv --map builtin:parallel-walls-4m --log four1.csv four2.csv)
+"$backwash" study --rows "${rooms[@]}" >rooms.jsonl && "$backwash" study "${rooms[@]}" --quick --json >rooms.json &&
+  "$backwash" study --vehicle $quad --map builtin:parallel-walls-4m --map builtin:parallel-walls-2m --from rooms.jsonl --quick --json >from.json &&
+  "$backwash" study --vehicle $quad --map builtin:parallel-walls-4m --log two1.csv --map builtin:parallel-walls-2m --log four1.csv --log two2.csv --json >changed.json 2>stderr || die "study of two rooms: $(cat stderr)"
+cmp rooms.json from.json || die "rows of two rooms are another study"
+python3 - <<'PYTHON'
+import json
+told, changed = json.load(open("rooms.json")), json.load(open("changed.json"))
+assert [(share["log"], share["map"][-2:]) for share in told["map_shares"]] == [("two1.csv", "2m"), ("two2.csv", "2m"), ("four1.csv", "4m"), ("four2.csv", "4m")]
+assert told["flights"] == 4 and all(share["inside"] + share["too_near"] + share["outside"] == 0 for share in told["map_shares"])
+assert changed["flights"] == 2, changed
+assert [left["log"] for left in changed["left_out"]] == ["four1.csv"]
+assert changed["map_shares"][1]["outside"] > 0.1 and "parallel-walls-2m" in changed["left_out"][0]["why"]
+PYTHON
+status=0
+"$backwash" study two1.csv "${rooms[@]}" >log 2>stderr || status=$?
+[[ $status == 64 ]] && grep -q 'two1.csv follows none of the several --map' stderr || die "a log without its map: exit $status, $(cat stderr)"
 # Logs without a map: a page of a flat floor.
 "$backwash" calibrate --log poor1.csv poor2.csv two1.csv --vehicle $quad --keep-base --bootstraps 20 --report flat.html >log 2>stderr || die "without a map: $(cat stderr)"
 

@@ -33,7 +33,7 @@ report::Chart bound_chart(const Data& data, const Model& model, int axis, const 
       mean += hovers[i]->p_W / static_cast<double>(until - from);
       for (const Vec3& v : hovers[i]->ln_variance) dots.push_back({hovers[i]->p_W.y(), v[axis] / std::numbers::ln10});
     }
-    const int columns = static_cast<int>((high - low) / kCalibrationRules.figure_step) + 1;
+    const int columns = static_cast<int>((high - low) / kCalibrationRules.same_place) + 1;
     for (int j = 0; j <= columns; ++j) {
       const Vec3 p(mean.x(), low + (high - low) * j / columns, mean.z());
       bound.push_back({p.y(), std::log10(field.at(p).sigma().along(Vec3::Unit(axis)))});

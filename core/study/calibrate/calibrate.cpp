@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/study/calibrate/calibration_rules.hpp"
+#include "core/types/normal.hpp"
 
 namespace backwash::study::calibrate {
 namespace {
@@ -69,7 +70,7 @@ double tau(const Data& data, std::span<const double> weights) {
 /// resampling n flights sees only (n − 1)/n of their variance, and few flights have Student's tails.
 double widening(std::size_t flights, std::size_t places) {
   const double n = static_cast<double>(flights), freedom = std::max(1.0, n - static_cast<double>(places));
-  constexpr double kZ = kCalibrationRules.interval_z;
+  constexpr double kZ = normal::k975;
   return std::sqrt(n / freedom) * (1 + (kZ * kZ + 1) / (4 * freedom));  // t/z to first order in 1/freedom
 }
 
@@ -165,7 +166,7 @@ std::vector<Hover> hovers_of(const FlightWindows& flight, std::size_t number, co
     hovers[i].p_W = at[i];
     hovers[i].features = found[i];
     hovers[i].push_noise /=
-        kCalibrationRules.same_window * static_cast<double>(hovers[i].ln_variance.size());  // over its time
+        kWindowRules.window_length * static_cast<double>(hovers[i].ln_variance.size());  // over its time
   }
   return hovers;
 }

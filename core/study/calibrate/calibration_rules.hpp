@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <vector>
-
 #include "core/study/windows/gates/rule.hpp"
-#include "core/types/normal.hpp"
 
 namespace backwash::study::calibrate {
 
 /// Every constant that decides what calibration says, beside the options that a caller may set (`backwash study
 /// --rules`). Members are rules and nothing else.
 struct CalibrationRules {
+  // clang-format off
   // Fit
   Rule quantile{"quantile", 0.9, "of windows", "chosen: the bound's, unless told otherwise"};
   Rule fit_rounds{"fit_rounds", 3, "rounds", "chosen: of flights' levels and bound in turn"};
@@ -33,9 +31,7 @@ struct CalibrationRules {
   Rule folds{"folds", 5, "1", "chosen: a fifth of the flights is held out at a time"};
   Rule push_quantile{"push_quantile", 0.95, "1", "chosen: the steady push that 19 of 20 hovers stay below"};
   Rule interval_tail{"interval_tail", 0.025, "1", "derived: an interval of 95 % leaves so much beyond each end"};
-  Rule interval_z{"interval_z", normal::k975, "1", "derived: its quantile of the normal distribution"};
   Rule same_place{"same_place", 0.1, "m", "derived: a voxel: windows farther apart are another hover"};
-  Rule same_window{"same_window", 2, "s", "derived: window_length, over which the noise of a mean is told"};
   // Refusals
   Rule least_flights{"least_flights", 3, "flights", "derived: scatter between flights, and a flight held out"};
   Rule least_of_place{"least_of_place", 2, "flights", "derived: of one map, to tell flights from maps"};
@@ -44,21 +40,15 @@ struct CalibrationRules {
   // Assessment
   Rule height_step{"height_step", 0.25, "m", "chosen: of the bound by height alone, the rival of the model"};
   Rule highest{"highest", 100, "m", "derived: above all floors, where none is below"};
-  Rule figure_step{"figure_step", 0.1, "m", "derived: a voxel, of the drawn bound"};
   // Variance by height
-  Rule least_height{"least_height", 0.005, "m", "derived: as clear: nearer, feet may touch"};
   Rule fewest_height_rows{"fewest_height_rows", 10, "windows", "chosen: the regression has 6 columns"};
-  Rule low_height{"low_height", 0.01, "m",
-                  "derived: the lowest height of the recordings (docs/measurements/recordings.md)"};
+  Rule low_height{"low_height", 0.01, "m", "derived: the lowest height of the recordings (docs/measurements/recordings.md)"};
   Rule high_height{"high_height", 0.8, "m", "derived: the highest height of the recordings"};
-  Rule height_length{"height_length", 0.05, "m",
-                     "chosen: where half of the wash returns, two rotor radii of the recorded craft"};
+  Rule height_length{"height_length", 0.05, "m", "chosen: where half of the wash returns, two rotor radii of the recorded craft"};
   Rule height_draws{"height_draws", 500, "draws", "derived: 2.5 % of them are the 12th value from each end"};
   Rule height_ridge{"height_ridge", 1e-9, "1", "derived: keeps an inverse finite, changes no digit that is told"};
+  // clang-format on
 };
 inline constexpr CalibrationRules kCalibrationRules;
-
-/// All of them, in the order of the struct.
-std::vector<Rule> rules();
 
 }  // namespace backwash::study::calibrate

@@ -12,24 +12,27 @@ namespace {
 
 constexpr double kLeastDecay = kCalibrationRules.least_decay, kDecayRatio = kCalibrationRules.decay_ratio;
 
-/// Pairs a value with its place in a model, both ways.
-template <typename M, typename Visit>
-void for_each_place(M& m, Visit visit) {
-  visit(kBaseH, m.base.horizontal);
-  visit(kBaseZ, m.base.vertical);
-  visit(kGroundLambdaH, m.ground.lambda.horizontal);
-  visit(kGroundLambdaZ, m.ground.lambda.vertical);
-  visit(kGroundK1H, m.ground.k1.horizontal);
-  visit(kGroundK1Z, m.ground.k1.vertical);
-  visit(kCornerN, m.corner.lambda.normal);
-  visit(kCornerT, m.corner.lambda.tangential);
-  visit(kCornerZ, m.corner.lambda.vertical);
-  visit(kWallN, m.wall.k1.normal);
-  visit(kWallT, m.wall.k1.tangential);
-  visit(kWallZ, m.wall.k1.vertical);
-  visit(kGroundK2, m.ground.k2);
-  visit(kWallK2, m.wall.k2);
-}
+/// Key and place of each parameter, in the order of Parameter.
+struct Place {
+  std::string_view key;
+  double& (*in)(Model&);
+};
+constexpr std::array<Place, kParameters> kPlaces{{
+    {"base.horizontal", [](Model& m) -> double& { return m.base.horizontal; }},
+    {"base.vertical", [](Model& m) -> double& { return m.base.vertical; }},
+    {"ground.lambda.horizontal", [](Model& m) -> double& { return m.ground.lambda.horizontal; }},
+    {"ground.lambda.vertical", [](Model& m) -> double& { return m.ground.lambda.vertical; }},
+    {"ground.k1.horizontal", [](Model& m) -> double& { return m.ground.k1.horizontal; }},
+    {"ground.k1.vertical", [](Model& m) -> double& { return m.ground.k1.vertical; }},
+    {"corner.lambda.normal", [](Model& m) -> double& { return m.corner.lambda.normal; }},
+    {"corner.lambda.tangential", [](Model& m) -> double& { return m.corner.lambda.tangential; }},
+    {"corner.lambda.vertical", [](Model& m) -> double& { return m.corner.lambda.vertical; }},
+    {"wall.k1.normal", [](Model& m) -> double& { return m.wall.k1.normal; }},
+    {"wall.k1.tangential", [](Model& m) -> double& { return m.wall.k1.tangential; }},
+    {"wall.k1.vertical", [](Model& m) -> double& { return m.wall.k1.vertical; }},
+    {"ground.k2", [](Model& m) -> double& { return m.ground.k2; }},
+    {"wall.k2", [](Model& m) -> double& { return m.wall.k2; }},
+}};
 
 /// A model whose breakdown is the features for one decay: horizontal and vertical (normal and vertical) amplitudes are
 /// set apart so that one evaluation tells the sums from each other.
@@ -72,33 +75,18 @@ Cubic interpolated(const std::array<double, kDecays>& stored, double ln_k) {
 
 }  // namespace
 
-std::string_view key(Parameter p) noexcept {
-  constexpr std::array<std::string_view, kParameters> kKeys = {"base.horizontal",
-                                                               "base.vertical",
-                                                               "ground.lambda.horizontal",
-                                                               "ground.lambda.vertical",
-                                                               "ground.k1.horizontal",
-                                                               "ground.k1.vertical",
-                                                               "corner.lambda.normal",
-                                                               "corner.lambda.tangential",
-                                                               "corner.lambda.vertical",
-                                                               "wall.k1.normal",
-                                                               "wall.k1.tangential",
-                                                               "wall.k1.vertical",
-                                                               "ground.k2",
-                                                               "wall.k2"};
-  return kKeys[p];
-}
+std::string_view key(Parameter p) noexcept { return kPlaces[p].key; }
 
 Parameters parameters_of(const Model& model) noexcept {
+  Model copy = model;
   Parameters values{};
-  for_each_place(model, [&](Parameter p, double value) { values[p] = value; });
+  for (std::size_t p = 0; p < kParameters; ++p) values[p] = kPlaces[p].in(copy);
   return values;
 }
 
 Model with_parameters(const Model& gates, const Parameters& parameters) noexcept {
   Model model = gates;
-  for_each_place(model, [&](Parameter p, double& value) { value = parameters[p]; });
+  for (std::size_t p = 0; p < kParameters; ++p) kPlaces[p].in(model) = parameters[p];
   return model;
 }
 

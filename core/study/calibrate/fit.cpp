@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/calibrate/fit.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <nlopt.hpp>
@@ -157,44 +158,33 @@ struct LevelScatter {
 
 /// Sums of one group by flight.
 struct Sums {
-  std::vector<double> first, second, count;
-  explicit Sums(std::size_t flights) : first(flights), second(flights), count(flights) {}
+  Eigen::ArrayXd first, second, count;
+  explicit Sums(Eigen::Index n) : first(n), second(n), count(n) { first = second = count = Eigen::ArrayXd::Zero(n); }
 };
 
 void analyse(const Data& data, std::span<const double> weights, const Sums& r, Group g, LevelScatter& s) {
-  const std::size_t flights = weights.size();
-  const auto used = [&](std::size_t f) { return weights[f] > 0 && r.count[f] > 0; };
-  std::vector<double> place_sum, place_weight;
-  double total = 0, within = 0, freedom = 0;
-  for (std::size_t f = 0; f < flights; ++f) {
-    if (!used(f)) continue;
-    const double m = r.first[f] / r.count[f];
-    const std::size_t place = data.place[f];
-    if (place >= place_sum.size()) {
-      place_sum.resize(place + 1);
-      place_weight.resize(place + 1);
-    }
-    place_sum[place] += weights[f] * m;
-    place_weight[place] += weights[f];
-    within += weights[f] * (r.second[f] - r.count[f] * m * m);
-    freedom += weights[f] * (r.count[f] - 1);
-    total += weights[f];
-    s.means[f][g] = m;
+  const auto flights = static_cast<Eigen::Index>(weights.size());
+  const Eigen::ArrayXd all = Eigen::Map<const Eigen::ArrayXd>(weights.data(), flights), n = r.count.max(1);
+  const Eigen::ArrayXd weight = (r.count > 0).select(all, 0);
+  Eigen::ArrayXd mean = r.first / n;
+  const double total = weight.sum(), freedom = (weight * (n - 1)).sum();
+  const double within = freedom > 0 ? (weight * (r.second - n * mean.square())).sum() / freedom : 0;
+  const auto places = static_cast<Eigen::Index>(1 + *std::ranges::max_element(data.place));
+  Eigen::ArrayXd sum = Eigen::ArrayXd::Zero(places), of = sum;
+  const auto place = [&](Eigen::Index f) { return static_cast<Eigen::Index>(data.place[static_cast<std::size_t>(f)]); };
+  for (Eigen::Index f = 0; f < flights; ++f) {
+    sum[place(f)] += weight[f] * mean[f];
+    of[place(f)] += weight[f];
   }
-  const double within_variance = freedom > 0 ? within / freedom : 0;
-  double between = 0, windows_explain = 0, places = 0;
-  for (const double weight : place_weight) places += weight > 0 ? 1 : 0;
-  for (std::size_t f = 0; f < flights; ++f) {
-    if (!used(f)) continue;
-    s.means[f][g] -= place_sum[data.place[f]] / place_weight[data.place[f]];
-    between += weights[f] * s.means[f][g] * s.means[f][g];
-    windows_explain += weights[f] / total * within_variance / r.count[f];
-  }
-  const double variance = total > places ? std::max(0.0, between / (total - places) - windows_explain) : 0;
+  for (Eigen::Index f = 0; f < flights; ++f) mean[f] = weight[f] > 0 ? mean[f] - sum[place(f)] / of[place(f)] : 0;
+  const double explained = within * (weight / n).sum() / total, free = total - static_cast<double>((of > 0).count());
+  const double variance = free > 0 ? std::max(0.0, (weight * mean.square()).sum() / free - explained) : 0;
   s.between[g] = std::sqrt(variance);
-  s.within[g] = std::sqrt(within_variance);
-  for (std::size_t f = 0; f < flights; ++f) {
-    if (used(f) && variance > 0) s.levels[f][g] = variance / (variance + within_variance / r.count[f]) * s.means[f][g];
+  s.within[g] = std::sqrt(within);
+  for (Eigen::Index f = 0; f < flights; ++f) {
+    const auto k = static_cast<std::size_t>(f);
+    s.means[k][g] = mean[f];
+    s.levels[k][g] = variance > 0 ? variance / (variance + within / n[f]) * mean[f] : 0;
   }
 }
 
@@ -213,9 +203,11 @@ void for_each_residual(const Data& data, std::span<const double> weights, const 
 LevelScatter scatter(const Data& data, std::span<const double> weights, const Parameters& parameters) {
   const std::size_t flights = weights.size();
   LevelScatter s{Levels(flights), Levels(flights), {}, {}};
-  std::array<Sums, kGroups> sums{Sums(flights), Sums(flights)};
-  for_each_residual(data, weights, parameters, [&](std::size_t flight, int axis, double r) {
+  const auto n = static_cast<Eigen::Index>(flights);
+  std::array<Sums, kGroups> sums{Sums(n), Sums(n)};
+  for_each_residual(data, weights, parameters, [&](std::size_t number, int axis, double r) {
     auto& g = sums[group(axis)];
+    const auto flight = static_cast<Eigen::Index>(number);
     g.first[flight] += r;
     g.second[flight] += r * r;
     g.count[flight] += 1;

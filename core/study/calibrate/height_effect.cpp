@@ -154,7 +154,7 @@ std::vector<HeightRow> height_rows(const FlightWindows& windows, const log::Flig
   std::vector<HeightRow> rows;
   for (const auto& w : windows.windows) {
     const double height = w.p_W.z() - stood;
-    if (height < kCalibrationRules.least_height || !(w.variance.z() > 0) || !(w.speed_mps > 0)) continue;
+    if (height < kWindowRules.clear || !(w.variance.z() > 0) || !(w.speed_mps > 0)) continue;
     rows.push_back(
         {flight, static_cast<int>(first("day", 0)), std::log(w.variance.z()), std::log(w.speed_mps), height, plate});
   }

@@ -81,6 +81,27 @@ Vec3 towards(const std::vector<std::pair<double, Vec3>>& walls, F amount) {
   return sum;
 }
 
+/// Functions for Form::columns of one column, by the scale too: value(window, scale) in one channel, and in ln variance
+/// along all axes; amount(place, scale) that lifts along the window.
+template <typename F>
+auto shows(Channel channel, F value) {
+  return [=](const Windows& ws, const Scale& scale) {
+    return std::vector{in(channel, ws, [&](auto& w) { return value(w, scale); })};
+  };
+}
+template <typename F>
+auto scatters(F value) {
+  return [=](const Windows& ws, const Scale& scale) {
+    return std::vector{in_variance(ws, [&](auto& w) { return value(w, scale); })};
+  };
+}
+template <typename F>
+auto lifts(F amount) {
+  return [=](const Windows& ws, const Scale& scale) {
+    return std::vector{lifting(ws, [&](auto& at) { return amount(at, scale.value); })};
+  };
+}
+
 /// (reference/distance)^n, nowhere nearer than near_surface() goes; 0 where there is no surface.
 double power_of_distance(double distance, double reference, double n);
 

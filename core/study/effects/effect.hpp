@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "core/study/effects/prior_rules.hpp"
-#include "core/study/effects/remedy.hpp"
 #include "core/study/windows/observation.hpp"
 #include "core/types/model.hpp"
 #include "core/types/simulation_term.hpp"
@@ -27,6 +26,14 @@ struct DesignColumn {
   };
   std::vector<Part> parts;
 };
+
+/// Calls take(channel, window, θ x) for every value of columns, θ one for each.
+template <typename Theta, typename F>
+void each_value(std::span<const DesignColumn> columns, const Theta& theta, F take) {
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    for (const auto& part : columns[k].parts)
+      for (std::size_t i = 0; i < part.x.size(); ++i) take(part.channel, i, theta[k] * part.x[i]);
+}
 
 using Windows = std::vector<WindowRow>;
 
@@ -139,6 +146,31 @@ struct Form {
   /// 8-3b. That is −ln of Cauchy's density over its value at 0: tails so heavy that what flights show plainly stands.
   double prior_nats(std::span<const double> sizes) const;
 };
+
+/// Where a remedy is made: in a file, in the craft itself or in the place where it flies.
+enum class RemedyIn : std::uint8_t { vehicle, model, map, craft, place };
+/// "vehicle" …, as written above.
+const char* to_string(RemedyIn in) noexcept;
+
+/// What an engineer changes where a cause is found: a key of a file with its value, or what to do with the craft.
+struct Remedy {
+  struct Set {
+    std::string key;  ///< of the file: "controller.latency"
+    double from, to;  ///< in the unit of docs/interfaces.md
+  };
+  RemedyIn in;
+  std::vector<Set> set = {};  ///< of the vehicle file; empty otherwise
+  std::string words;          ///< one sentence, an order
+};
+
+/// The model that `backwash study --out` writes has it.
+Remedy by_extension(const FittedForm& fitted);
+Remedy with_craft(std::string words);
+/// A function for Effect::remedy that always says so.
+std::function<Remedy(const FittedForm&, const Vehicle&)> always(RemedyIn in, std::string words);
+Remedy in_vehicle(std::vector<Remedy::Set> set);
+/// "rotor 3"; of a form whose scale is a rotor's number.
+std::string rotor_of(const FittedForm& fitted);
 
 /// Where an effect is that rotors differ by. Those of a sound craft differ too: without sound flights it is not told.
 enum class AtRotors : std::uint8_t { no, weight, propeller, sensor };

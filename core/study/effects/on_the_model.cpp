@@ -10,12 +10,11 @@ double half_width(const Estimate& e) { return std::max(0.0, (e.high - e.low) / 2
 
 std::vector<double> added(const FittedForm& fitted, const Observations& seen, Channel channel) {
   std::vector<double> sum;
-  for (std::size_t k = 0; k < fitted.columns.size(); ++k)
-    for (const auto& part : fitted.columns[k].parts) {
-      if (part.channel != channel) continue;
-      sum.resize(seen.windows.size(), 0);
-      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += fitted.theta[k] * part.x[i];
-    }
+  each_value(fitted.columns, fitted.theta, [&](Channel c, std::size_t i, double x) {
+    if (c != channel) return;
+    sum.resize(seen.windows.size(), 0);
+    sum[i] += x;
+  });
   return sum;
 }
 
@@ -45,10 +44,9 @@ std::vector<ModelEffect> unknown_push(const FittedForm& fitted, const Observatio
 std::vector<ModelEffect> flown_range(const FittedForm& fitted, const Observations& seen) {
   auto z = added(fitted, seen, kMeanZ);
   if (fitted.form.companions && !fitted.beside.empty()) {
-    const auto open = fitted.form.companions(seen.windows);
-    for (std::size_t k = 0; k < std::min(open.size(), fitted.beside.size()); ++k)
-      for (const auto& part : open[k].parts)
-        for (std::size_t i = 0; i < z.size() && part.channel == kMeanZ; ++i) z[i] += fitted.beside[k] * part.x[i];
+    auto open = fitted.form.companions(seen.windows);
+    open.resize(std::min(open.size(), fitted.beside.size()));
+    each_value(open, fitted.beside, [&](Channel c, std::size_t i, double x) { z[i] += c == kMeanZ ? x : 0; });
   }
   const auto [low, high] = std::minmax_element(z.begin(), z.end());
   const Estimate& first = fitted.parameters.front();

@@ -61,12 +61,12 @@ std::vector<DesignColumn> companions(const Form& form, const Observations& seen)
 
 Windows moved_by(const Windows& windows, const std::vector<DesignColumn>& columns, const Eigen::VectorXd& theta) {
   Windows moved = windows;
+  std::vector<Vec3> pushes(windows.size(), Vec3::Zero());
+  each_value(columns, theta, [&](Channel c, std::size_t i, double x) {
+    if (c <= kMeanZ) pushes[i][static_cast<Eigen::Index>(c)] += x;
+  });
   for (std::size_t i = 0; i < moved.size(); ++i) {
-    Vec3 push = Vec3::Zero();
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      for (const auto& part : columns[k].parts)
-        if (part.channel <= kMeanZ)
-          push[static_cast<Eigen::Index>(part.channel)] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
+    const Vec3& push = pushes[i];
     if (moved[i].held_off || !moved[i].led) continue;
     const Vec3 by = push.cwiseProduct(moved[i].led->give).cwiseMax(-kStrayed).cwiseMin(kStrayed);
     const auto move = [&](PlaceAround& place) {

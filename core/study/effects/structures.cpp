@@ -16,29 +16,23 @@ namespace {
 using std::numbers::pi;
 using Take = std::function<void(Structure&&)>;
 
-constexpr int kFew = static_cast<int>(kEffectRules.few_cosines), kMany = static_cast<int>(kEffectRules.many_cosines);
+constexpr int kFew = static_cast<int>(kEffectRules.few_cosines), kMany = 2 * kFew;
 constexpr int kTurns = static_cast<int>(kEffectRules.angle_turns);
 constexpr double kHighest = kEffectRules.tone_highest;
 
-std::vector<double> cosine(double k, const std::vector<double>& u) {
-  std::vector<double> x;
-  x.reserve(u.size());
-  for (const double q : u) x.push_back(std::cos(k * q));
-  return x;
+std::vector<double> cosine(double k, std::vector<double> u) {
+  for (double& q : u) q = std::cos(k * q);
+  return u;
 }
 
-std::vector<double> sine(double k, const std::vector<double>& u) {
-  std::vector<double> x;
-  x.reserve(u.size());
-  for (const double q : u) x.push_back(std::sin(k * q));
-  return x;
+std::vector<double> sine(double k, std::vector<double> u) {
+  for (double& q : u) q = std::sin(k * q);
+  return u;
 }
 
-std::vector<double> product(const std::vector<double>& a, const std::vector<double>& b) {
-  std::vector<double> x;
-  x.reserve(a.size());
-  for (std::size_t i = 0; i < a.size(); ++i) x.push_back(a[i] * b[i]);
-  return x;
+std::vector<double> product(std::vector<double> a, const std::vector<double>& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) a[i] *= b[i];
+  return a;
 }
 
 Functions turn(int k, const std::vector<double>& angle) { return {cosine(k, angle), sine(k, angle)}; }

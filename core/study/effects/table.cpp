@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <random>
 #include <stdexcept>
 
@@ -149,6 +150,36 @@ std::optional<std::string> why_not_tested(const Form& form, const Observations& 
   if (!seen.has(Source::acceleration))
     return seen.missing.at(Source::acceleration) + ": of differentiated motion the gusts are not told from its noise";
   return "no window measures it";
+}
+
+const char* to_string(RemedyIn in) noexcept {
+  constexpr const char* kNames[] = {"vehicle", "model", "map", "craft", "place"};
+  return kNames[static_cast<std::size_t>(in)];
+}
+
+Remedy by_extension(const FittedForm& fitted) {
+  return {RemedyIn::model, {}, "Fly with the model that --out writes: it holds " + fitted.form.cause() + "."};
+}
+
+Remedy with_craft(std::string words) { return {RemedyIn::craft, {}, std::move(words)}; }
+
+std::function<Remedy(const FittedForm&, const Vehicle&)> always(RemedyIn in, std::string words) {
+  return [remedy = Remedy{in, {}, std::move(words)}](auto&, auto&) { return remedy; };
+}
+
+Remedy in_vehicle(std::vector<Remedy::Set> set) {
+  std::string words;
+  for (const auto& [key, from, to] : set) {
+    char text[128];
+    std::snprintf(text, sizeof text, "%s %s from %.3g to %.3g", words.empty() ? "Change" : " and", key.c_str(), from,
+                  to);
+    words += text;
+  }
+  return {RemedyIn::vehicle, std::move(set), words + " in the vehicle file."};
+}
+
+std::string rotor_of(const FittedForm& fitted) {
+  return "rotor " + std::to_string(std::lround(fitted.scale.value) + 1);
 }
 
 }  // namespace backwash::study

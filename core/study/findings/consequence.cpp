@@ -43,11 +43,11 @@ Added held_out(const StudyResult& result, const Observations& seen) {
             to[i] += theta[static_cast<Eigen::Index>(k)] * part.x[i];
         }
     }
-    const auto open = companions(*cause.found.form, seen);
-    for (std::size_t k = 0; k < std::min(open.size(), cause.applied.beside.size()); ++k)
-      for (const auto& part : open[k].parts)
-        for (std::size_t i = 0; i < part.x.size() && part.channel <= kMeanZ; ++i)
-          added.mean[part.channel][i] += cause.applied.beside[k] * part.x[i];
+    auto open = companions(*cause.found.form, seen);
+    open.resize(std::min(open.size(), cause.applied.beside.size()));
+    each_value(open, cause.applied.beside, [&](Channel c, std::size_t i, double x) {
+      if (c <= kMeanZ) added.mean[c][i] += x;
+    });
   }
   return added;
 }
@@ -69,11 +69,18 @@ double inside(const Observations& seen, const BoundModel& bound, const Added* ad
   return count > 0 ? sum / count : 0;
 }
 
-std::vector<Vec3> places_of(const Observations& seen) {
-  std::vector<Vec3> places;
+/// Places by map, in the order in which they were flown; a null pointer stands for no map.
+std::vector<std::pair<const map::OccupancyGrid*, std::vector<Vec3>>> places_of(
+    const Observations& seen, std::span<const map::OccupancyGrid* const> grids) {
+  std::vector<std::pair<const map::OccupancyGrid*, std::vector<Vec3>>> all;
   const std::size_t every = seen.windows.size() / static_cast<std::size_t>(kRules.places) + 1;
-  for (std::size_t i = 0; i < seen.windows.size(); i += every) places.push_back(seen.windows[i].p_W);
-  return places;
+  for (std::size_t i = 0; i < seen.windows.size(); i += every) {
+    const auto* grid = grids.empty() ? nullptr : grids[seen.windows[i].flight];
+    auto found = std::ranges::find(all, grid, [](const auto& one) { return one.first; });
+    if (found == all.end()) found = all.insert(all.end(), {grid, {}});
+    found->second.push_back(seen.windows[i].p_W);
+  }
+  return all;
 }
 
 void describe(FlightOutcome& outcome, const std::vector<reach::HoverSet>& sets) {
@@ -138,6 +145,7 @@ void try_plan(FlightOutcome& outcome, const plan::World& world, const Vec3& star
   const plan::PlanOptions options{.v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kRules.plan_deadline};
   const auto plan = plan::plan(world, {{start_W, Vec3::Zero()}, hover}, goal_W, options);
   outcome.plan = plan.status;
+  outcome.flown.reset();
   if (plan.status == plan::PlanStatus::ok) outcome.flown = plan.metrics;
 }
 
@@ -154,31 +162,38 @@ std::pair<Vec3, Vec3> farthest(const std::vector<Vec3>& places, const std::vecto
 }  // namespace
 
 Consequence consequence(const StudyResult& result, const Observations& seen, const Model& model, const Vehicle& vehicle,
-                        const map::OccupancyGrid* grid, const Parallel& parallel) {
+                        std::span<const map::OccupancyGrid* const> grids, const Parallel& parallel) {
   Consequence c;
   const Added added = held_out(result, seen);
   c.before.inside = inside(seen, model.bound, nullptr);
   c.after.inside = inside(seen, model.bound, &added);
   const Model after = extended(model, result, seen);
-  const auto places = places_of(seen);
-  c.places = places.size();
-  if (!grid || places.empty()) {
+  const auto by_map = places_of(seen, grids);
+  for (const auto& [grid, places] : by_map) c.places += places.size();
+  if (grids.empty() || by_map.empty()) {
     describe(c.before, sets_in_the_open(model, vehicle));
     describe(c.after, sets_in_the_open(after, vehicle));
     return c;
   }
-  const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, std::nullopt, parallel);
-  const auto extended_world = plan::build_world(*grid, after, vehicle, reach::Method::tight, std::nullopt, parallel);
-  const auto sets = sets_at(*world, places), sets_after = sets_at(*extended_world, places);
+  std::vector<reach::HoverSet> sets, sets_after;
+  double longest = kRules.least_route;
+  for (const auto& [grid, places] : by_map) {
+    const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, std::nullopt, parallel);
+    const auto extended_world = plan::build_world(*grid, after, vehicle, reach::Method::tight, std::nullopt, parallel);
+    const auto here = sets_at(*world, places), here_after = sets_at(*extended_world, places);
+    sets.insert(sets.end(), here.begin(), here.end());
+    sets_after.insert(sets_after.end(), here_after.begin(), here_after.end());
+    const auto [start_W, goal_W] = farthest(places, here);
+    if ((goal_W - start_W).norm() <= longest) continue;
+    longest = (goal_W - start_W).norm();
+    std::tie(c.start_W, c.goal_W) = std::pair(start_W, goal_W);
+    try_plan(c.before, *world, start_W, goal_W);
+    try_plan(c.after, *extended_world, start_W, goal_W);
+  }
   describe(c.before, sets);
   describe(c.after, sets_after);
   c.before.safe = safe_share(sets);
   c.after.safe = safe_share(sets_after);
-  std::tie(c.start_W, c.goal_W) = farthest(places, sets);
-  if ((c.goal_W - c.start_W).norm() > kRules.least_route) {
-    try_plan(c.before, *world, c.start_W, c.goal_W);
-    try_plan(c.after, *extended_world, c.start_W, c.goal_W);
-  }
   return c;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 
 #include "core/plan/planner.hpp"
@@ -31,10 +32,10 @@ struct Consequence {
 };
 
 /// Before and after the accepted causes joined the model. `inside` after: with parameters fitted without the window's
-/// flight. Hover sets: at up to 60 of the flown places, of worlds with the map, or without one from Σ_0 alone. The
-/// plan: between the two places farthest apart that are safe in the world before. Two worlds are built: seconds on a
-/// large map.
+/// flight. Hover sets: at up to 60 of the flown places, of worlds with the maps, or without any from Σ_0 alone. The
+/// plan: between the two places of one map farthest apart that are safe in the world before. `grids`: of each flight,
+/// or empty. Two worlds are built of each map: seconds of a large one.
 Consequence consequence(const StudyResult& result, const Observations& seen, const Model& model, const Vehicle& vehicle,
-                        const map::OccupancyGrid* grid, const Parallel& parallel = run_serial);
+                        std::span<const map::OccupancyGrid* const> grids, const Parallel& parallel = run_serial);
 
 }  // namespace backwash::study

@@ -74,18 +74,20 @@ AppliedTerms apply(const std::vector<ExtensionTerm>& terms, Observations& seen) 
       coefficients.push_back(term.beside[coefficients.size() - term.theta.size()]);
       columns.push_back(column);
     }
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      for (const auto& part : columns[k].parts)
-        for (std::size_t i = 0; i < part.x.size(); ++i) seen.y[part.channel][i] -= coefficients[k] * part.x[i];
+    each_value(columns, coefficients, [&](Channel c, std::size_t i, double x) { seen.y[c][i] -= x; });
   }
   return applied;
 }
 
-std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations& seen) {
+FittedForm fitted_form(const NamedCause& cause) {
   const Accepted& f = cause.found;
   const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
-  if (!f.form->extend) return {};
-  auto effects = f.form->extend({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
+  return {*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside};
+}
+
+std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations& seen) {
+  if (!cause.found.form->extend) return {};
+  auto effects = cause.found.form->extend(fitted_form(cause), seen);
   for (auto& e : effects) {
     if (entry(e.kind).of_variance || cause.keeps) continue;
     e.error += e.value.cwiseAbs();
@@ -95,9 +97,7 @@ std::vector<ModelEffect> effects_of(const NamedCause& cause, const Observations&
 }
 
 std::vector<SimulationTerm> simulation_of(const NamedCause& cause, const Observations& seen) {
-  const Accepted& f = cause.found;
-  const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
-  auto terms = f.form->simulate({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, seen);
+  auto terms = cause.found.form->simulate(fitted_form(cause), seen);
   if (std::ranges::any_of(cause.shift_decay, [](double rate) { return rate > 0; }))
     terms.push_back({SimulationTerm::Kind::shift_decay, {cause.shift_decay.begin(), cause.shift_decay.end()}});
   return terms;

@@ -24,6 +24,9 @@ struct AppliedTerms {
   std::vector<ExtensionTerm> left;  ///< of which form or columns are unknown here
 };
 
+/// A cause's form as it was fitted. Keeps references to the cause.
+FittedForm fitted_form(const NamedCause& cause);
+
 /// Takes the terms out of the observations: the simulation is then the extended model's.
 AppliedTerms apply(const std::vector<ExtensionTerm>& terms, Observations& seen);
 

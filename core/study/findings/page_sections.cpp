@@ -39,7 +39,7 @@ std::string number(double value) {
 std::string too_few(const Observations& seen) {
   std::size_t good = 0;
   for (std::size_t f = 0; f < seen.units.size(); ++f) good += seen.units.first[f + 1] > seen.units.first[f] ? 1u : 0u;
-  const std::size_t needed = StudyOptions{}.fewest_flights;
+  const auto needed = static_cast<std::size_t>(kRules.fewest_flights);
   const bool grouped = seen.units.size() != seen.flights;
   std::string text = std::to_string(good) + (grouped ? " group" : " flight") + (good == 1 ? "" : "s") +
                      " with good windows, " + std::to_string(needed) + " are needed to warrant a name: fly " +

@@ -90,18 +90,16 @@ double rate_of(double left, std::span<const Vec3> push_W, const Observations& se
 std::vector<Vec3> pushes(std::span<const Accepted> causes, std::span<const std::vector<double>> beside,
                          const Observations& seen) {
   std::vector<Vec3> push_W(seen.windows.size(), Vec3::Zero());
-  const auto add = [&](const DesignColumn& column, double by) {
-    for (const auto& part : column.parts)
-      for (std::size_t i = 0; i < push_W.size() && part.channel <= kMeanZ; ++i)
-        push_W[i][static_cast<Eigen::Index>(part.channel)] += by * part.x[i];
+  const auto add = [&](Channel c, std::size_t i, double x) {
+    if (c <= kMeanZ) push_W[i][static_cast<Eigen::Index>(c)] += x;
   };
   for (std::size_t c = 0; c < causes.size(); ++c) {
     const Accepted& cause = causes[c];
     if (cause.form->in_sensor) continue;
-    for (std::size_t k = 0; k < cause.columns.size(); ++k)
-      add(cause.columns[k], cause.theta[static_cast<Eigen::Index>(k)]);
-    const auto open = companions(*cause.form, seen);
-    for (std::size_t k = 0; k < std::min(open.size(), beside[c].size()); ++k) add(open[k], beside[c][k]);
+    each_value(cause.columns, cause.theta, add);
+    auto open = companions(*cause.form, seen);
+    open.resize(std::min(open.size(), beside[c].size()));
+    each_value(open, beside[c], add);
   }
   return push_W;
 }

@@ -205,7 +205,7 @@ const char* to_string(StudyVerdict verdict) {
 }
 
 StudyResult study(const Observations& seen, const StudyOptions& options) {
-  if (flown(seen) < options.fewest_flights)
+  if (static_cast<double>(flown(seen)) < kRules.fewest_flights)
     return {.verdict = StudyVerdict::insufficient, .not_tested = untested(seen, std::nullopt)};
   SettledRotors settled = settle_rotors(options.sound, seen);
   const WholeSearch whole = search_all(std::move(settled.seen), options.search);

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "core/study/findings/applied.hpp"
 #include "core/study/findings/held_out.hpp"
 #include "core/study/findings/steady_answer.hpp"
 #include "core/study/inference/levels/dependence.hpp"
@@ -42,8 +41,6 @@ struct StudyOptions {
   bool minimum_detectable = true;
   bool dependence = true;  ///< whether what remains depends on something: where nothing is accepted, of the verdict too
   std::optional<SoundRotors> sound = {};  ///< of reference flights; without, rotors may differ as craft are built
-  std::size_t fewest_flights =
-      static_cast<std::size_t>(kRules.fewest_flights);  ///< fewer do not warrant a name (core/study/README.md)
 };
 
 struct StudyResult {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <tuple>
 
 #include "core/study/inference/estimate.hpp"
 
@@ -12,9 +13,7 @@ namespace {
 /// Observations with the cause put back.
 Observations with(const Accepted& cause, const Observations& rest) {
   Observations seen = rest;
-  for (std::size_t k = 0; k < cause.columns.size(); ++k)
-    for (const auto& [channel, x, aside] : cause.columns[k].parts)
-      for (std::size_t i = 0; i < x.size(); ++i) seen.y[channel][i] += cause.theta[static_cast<Eigen::Index>(k)] * x[i];
+  each_value(cause.columns, cause.theta, [&](Channel c, std::size_t i, double x) { seen.y[c][i] += x; });
   return seen;
 }
 
@@ -47,13 +46,8 @@ NamedCause named(const Change& cause, const Evidence& rest) {
   if (!normal.solvable) return told;  // one flight alone shows it
   for (std::size_t f = 0; f < normal.b.size(); ++f) normal.b[f] += normal.A[f] * cause.found.theta;
   const auto nats = normal.gain_per_flight();
-  const double n = static_cast<double>(nats.size()), sum = std::accumulate(nats.begin(), nats.end(), 0.0);
-  double square = 0;
-  for (const double g : nats) square += std::pow(g - sum / n, 2);
-  const double error = student_975(n - 1) * std::sqrt(square * n / (n - 1));
-  told.gain.held_out_nats = sum;
-  told.gain.low_nats = sum - error;
-  told.gain.high_nats = sum + error;
+  told.gain.held_out_nats = std::accumulate(nats.begin(), nats.end(), 0.0);
+  std::tie(told.gain.low_nats, told.gain.high_nats) = interval_of_sum(nats);
   return told;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/study/findings/extend.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/when_it_acts.hpp"
 #include "core/study/inference/rules.hpp"
@@ -11,10 +12,7 @@
 namespace backwash::study {
 
 Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle) {
-  const Accepted& f = cause.found;
-  const std::span theta(f.theta.data(), static_cast<std::size_t>(f.theta.size()));
-  auto remedy =
-      f.form->effect->remedy({*f.form, f.scale, f.columns, theta, f.parameters, cause.applied.beside}, vehicle);
+  auto remedy = cause.found.form->effect->remedy(fitted_form(cause), vehicle);
   if (cause.flights.empty() || remedy.in == RemedyIn::craft) return remedy;
   return {RemedyIn::craft, {}, "Look for what was different: " + where(cause) + "."};  // no file holds for some flights
 }
@@ -37,10 +35,7 @@ std::string odds(double nats) {
 double largest_flown(const Accepted& cause, const Observations& seen) {
   const Channel channel = cause.columns.front().parts.front().channel;
   std::vector<double> sum(seen.windows.size(), 0);
-  for (std::size_t k = 0; k < cause.columns.size(); ++k)
-    for (const auto& part : cause.columns[k].parts)
-      for (std::size_t i = 0; part.channel == channel && i < part.x.size(); ++i)
-        sum[i] += cause.theta[static_cast<Eigen::Index>(k)] * part.x[i];
+  each_value(cause.columns, cause.theta, [&](Channel c, std::size_t i, double x) { sum[i] += c == channel ? x : 0; });
   double largest = 0;
   for (const double x : sum) largest = std::max(largest, std::abs(x));
   return largest;

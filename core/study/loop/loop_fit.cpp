@@ -44,7 +44,7 @@ tl::expected<AnswerLog, LoopError> opened(const LoopLog& given, const Vehicle& v
   if (one.series.strayed) return bad("was flown elsewhere than its set-points say");
   if (one.series.size() < 2) return bad("has fewer than two rows");
   one.commands = commands_of(log, one.series.row);
-  const LogGates gates(log, one.series.row, vehicle, {});
+  const LogGates gates(log, one.series.row, vehicle);
   for (const auto& w : cut(one.series))
     if (!gates(w)) one.windows.push_back(w);
   if (one.windows.size() < 5) return bad("holds less than 10 s in the air that can be used");

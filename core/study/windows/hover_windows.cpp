@@ -83,7 +83,7 @@ void cut(const Even& e, const log::FlightLog& log, SampleRange raw, const LogGat
     std::size_t end = begin;
     while (end < e.size() && e.segment[end] == e.segment[begin]) ++end;
     const bool hover = e.segment[begin].has_value();
-    const auto settling = static_cast<std::size_t>(std::lround(options.settle_s * e.rate));
+    const auto settling = static_cast<std::size_t>(std::lround(kWindowRules.settle * e.rate));
     const std::size_t first = hover ? std::min(end, begin + settling) : end;
     transit += in_windows(first - begin);
     SampleRange good{first, first};
@@ -169,12 +169,12 @@ tl::expected<FlightWindows, log::LogError> flight_windows(const log::FlightLog& 
     return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data, path + *why});
   std::vector<std::size_t> rows(log.t_s.size());
   std::iota(rows.begin(), rows.end(), std::size_t{0});
-  const LogGates gates(log, std::move(rows), vehicle, options);
-  const auto stretches = unbroken(log.t_s, options);
+  const LogGates gates(log, std::move(rows), vehicle);
+  const auto stretches = unbroken(log.t_s);
   FlightWindows flight;
   std::tie(flight.gated[static_cast<std::size_t>(Gate::gap)], flight.rate_hz) =
       gaps_and_rate(log.t_s, stretches, options.length_s);
-  flight.band = options.band.within(flight.rate_hz);
+  flight.band = Band{}.within(flight.rate_hz);
   choose_signal(flight, has_xyz(log, "cmd_", "_m"), vehicle, options.tau_w);
   if (!log.has("thrust") && !log.has("motor1"))
     flight.not_tested.emplace_back("saturated: no column 'thrust' or 'motor1' … 'motor4'");

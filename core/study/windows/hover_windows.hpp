@@ -36,6 +36,13 @@ struct Window {
   std::size_t stretch;  ///< of FlightWindows::gusts, the unbroken one that it belongs to
 };
 
+/// How calibration cuts a log; all else is kWindowRules'.
+struct WindowOptions {
+  double length_s = kWindowRules.window_length;  ///< of a window
+  double tau_w = kWindowRules.tau_w;             ///< s, assumed when an attenuation is divided out
+  double still_mps = kWindowRules.still_speed;   ///< a hover is slower, averaged over kWindowRules.still_time
+};
+
 /// A flight, cut into windows.
 struct FlightWindows {
   Signal signal = Signal::raw;

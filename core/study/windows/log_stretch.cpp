@@ -77,10 +77,10 @@ std::vector<Vec3> beyond_command(const Even& e, const Resampler& rows, const log
   return w;
 }
 
-/// Hover positions found by the speed, averaged over `still_s`.
+/// Hover positions found by the speed, averaged over still_time.
 std::vector<std::optional<int>> found_segments(const std::vector<Vec3>& path, double rate, double still_mps,
-                                               double still_s, int& next) {
-  const auto half = static_cast<std::size_t>(std::max(1.0, std::round(still_s / 2 * rate)));
+                                               int& next) {
+  const auto half = static_cast<std::size_t>(std::max(1.0, std::round(kWindowRules.still_time / 2 * rate)));
   std::vector<std::optional<int>> segment(path.size());
   for (std::size_t k = 0; k < path.size(); ++k) {
     const std::size_t low = k > half ? k - half : 0, high = std::min(k + half, path.size() - 1);
@@ -108,9 +108,8 @@ Even even_stretch(const log::FlightLog& log, SampleRange raw, double rate, Signa
     for (std::size_t k = 0; k < e.size(); ++k) e.segment.push_back(segment_of(log.column("segment")[rows.nearest(k)]));
   } else {
     const bool commanded = has_xyz(log, "cmd_", "_m");
-    e.segment =
-        found_segments(commanded ? rows.xyz("cmd_", "_m") : e.p, rate,
-                       commanded ? kWindowRules.still_command.value : options.still_mps, options.still_s, next_segment);
+    e.segment = found_segments(commanded ? rows.xyz("cmd_", "_m") : e.p, rate,
+                               commanded ? kWindowRules.still_command.value : options.still_mps, next_segment);
   }
   e.w = signal == Signal::commanded ? beyond_command(e, rows, log, *vehicle) : e.a;
   return e;

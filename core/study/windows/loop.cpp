@@ -61,7 +61,7 @@ class Place {
 
 /// Pieces of the time between two rows; one after a gap.
 int pieces(double dt) {
-  if (dt > kWindowRules.restart) return 1;
+  if (dt > 2 * kWindowRules.held) return 1;
   return std::max(1, static_cast<int>(std::ceil(dt / kWindowRules.loop_step)));
 }
 
@@ -79,7 +79,7 @@ LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, double drag
   Vec3 a = Vec3::Zero();
   for (std::size_t i = 0; i < log.t.size(); ++i) {
     const double dt = i > 0 ? log.t[i] - log.t[i - 1] : 0;
-    const bool gap = dt > kWindowRules.restart;
+    const bool gap = dt > 2 * kWindowRules.held;
     if (gap) now = {log.p[i], log.v[i]};
     for (int k = 0; k < pieces(dt); ++k) {
       const double h = gap ? 0 : dt / pieces(dt), t = log.t[i] - dt + (k + 1) * h;
@@ -107,7 +107,7 @@ std::vector<std::vector<Vec3>> answers(const Flown& log, const loop::PositionLoo
   std::vector<Vec3> r(lags.size());
   for (std::size_t i = 0; i < log.t.size(); ++i) {
     const double dt = i > 0 ? log.t[i] - log.t[i - 1] : 0, h = dt / pieces(dt);
-    const bool begins = i == 0 || dt > kWindowRules.restart;
+    const bool begins = i == 0 || dt > 2 * kWindowRules.held;
     if (begins) std::ranges::fill(r, asked(log.t[i]));
     for (int k = 0; k < pieces(dt) && !begins; ++k) {
       const Vec3 u = asked(log.t[i] - dt + (k + 0.5) * h);

@@ -6,34 +6,13 @@
 namespace backwash::study {
 
 const char* channel_name(Channel c) {
-  static const char* const kNames[] = {"mean x",
-                                       "mean y",
-                                       "mean z",
-                                       "ln variance x",
-                                       "ln variance y",
-                                       "ln variance z",
-                                       "tail",
-                                       "thrust delay",
-                                       "thrust slope",
-                                       "command delay, level",
-                                       "command delay, z",
-                                       "tilt delay",
-                                       "line 1",
-                                       "line 2",
-                                       "line 3",
-                                       "line 4",
-                                       "motor 1",
-                                       "motor 2",
-                                       "motor 3",
-                                       "motor 4",
-                                       "rpm 1",
-                                       "rpm 2",
-                                       "rpm 3",
-                                       "rpm 4",
-                                       "dropout 1",
-                                       "dropout 2",
-                                       "dropout 3",
-                                       "dropout 4"};
+  // clang-format off
+  static const char* const kNames[] = {
+      "mean x", "mean y", "mean z", "ln variance x", "ln variance y", "ln variance z", "tail", "thrust delay",
+      "thrust slope", "command delay, level", "command delay, z", "tilt delay", "line 1", "line 2", "line 3", "line 4",
+      "motor 1", "motor 2", "motor 3", "motor 4", "rpm 1", "rpm 2", "rpm 3", "rpm 4",
+      "dropout 1", "dropout 2", "dropout 3", "dropout 4"};
+  // clang-format on
   return kNames[c];
 }
 

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "core/study/windows/gates/gates.hpp"
-#include "core/study/windows/placed_window.hpp"
 #include "core/study/windows/signals/instrument.hpp"
 #include "core/study/windows/signals/signals.hpp"
 
@@ -39,11 +38,10 @@ void Observer::add(const log::FlightLog& log) {
   if (static_cast<double>(s.size()) >= kWindowRules.fewest_rows) {
     const auto rotors = rotor_phases(log, s);
     std::vector<SampleRange> good;
-    const WindowOptions options;
-    const LogGates gates(log, s.row, vehicle_, options);
+    const LogGates gates(log, s.row, vehicle_);
     for (const SampleRange w : cut(s)) {
       auto why = gates(w);
-      if (!why) why = unfit(s, log, w, options);
+      if (!why) why = unfit(s, log, w);
       if (!why) why = misplaced(s, w);
       if (why)
         ++all_.seen.gated_out[*why];

@@ -15,6 +15,11 @@
 
 namespace backwash::study {
 
+/// Where and how a window was flown, and the air that the model has there; its flight and what is measured on it are
+/// left to the Observer. Precondition: all of it is near() the surroundings.
+WindowRow placed(const log::FlightLog& log, const Series& s, SampleRange w, const Vehicle& vehicle,
+                 MapView& surroundings);
+
 /// Adds a flight to the observations (gates, windows, channels). `grid` and `model` may be null: then no surfaces are
 /// known but the floor at z = 0, and Σ = Σ_0. Real-time status: offline.
 class Observer {

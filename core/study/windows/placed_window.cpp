@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/study/windows/placed_window.hpp"
+#include "core/study/windows/observer.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -118,8 +118,8 @@ WindowRow placed(const log::FlightLog& log, const Series& s, SampleRange w, cons
   row.around = surroundings.around(row.p_W);
   if (!surroundings.has_map()) {  // imported recordings say what stood below and above (backwash import)
     if (log.has("surface_z_m")) row.around.height = row.p_W.z() - column_mean("surface_z_m");
-    if (log.has("ceiling") && column_mean("ceiling") > kWindowRules.yes)
-      row.around.ceiling_gap = kWindowRules.said_ceiling;
+    if (log.has("ceiling") && column_mean("ceiling") > 0.5)
+      row.around.ceiling_gap = kCeilingReference;  // they do not say how far
   }
   look_along(row, w, p, v, surroundings);
   if (!as_told) row.speeds.fill(row.speed);

@@ -33,13 +33,12 @@ log::FlightLog read(const std::string& path) {
 
 /// Rows of windows that calibration and study leave out too.
 std::vector<char> gated_rows(const log::FlightLog& log, const Vehicle& vehicle) {
-  const study::WindowOptions options;
   std::vector<std::size_t> rows(log.t_s.size());
   std::iota(rows.begin(), rows.end(), std::size_t{0});
-  const study::LogGates gates(log, rows, vehicle, options);
+  const study::LogGates gates(log, rows, vehicle);
   std::vector<char> gated(rows.size());
   for (std::size_t begin = 0, end = 0; begin < rows.size(); begin = end) {
-    while (end < rows.size() && log.t_s[end] < log.t_s[begin] + options.length_s) ++end;
+    while (end < rows.size() && log.t_s[end] < log.t_s[begin] + study::kWindowRules.window_length) ++end;
     if (gates({begin, end}))
       std::fill(gated.begin() + static_cast<long>(begin), gated.begin() + static_cast<long>(end), 1);
   }

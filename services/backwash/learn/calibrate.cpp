@@ -186,7 +186,7 @@ int run(const CalibrateOptions& options) {
   const Provenance provenance{kVersion,      options.vehicle,    options.base_model, campaign.map_names,
                               campaign.logs, campaign.signal,    campaign.windows,   campaign.gated,
                               options.seed,  options.bootstraps, options.quantile};
-  if (!options.out.empty()) write_model_file(options.out, model_text(calibration, provenance), options.force);
+  if (!options.out.empty()) write_file(options.out, model_text(calibration, provenance), options.force, model_refusal);
   if (!options.report.empty())
     write_file(options.report,
                calibrate_page(calibration, campaign, refused, {options.quantile, options.vehicle, options.base_model}),

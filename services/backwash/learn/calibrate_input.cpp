@@ -37,7 +37,7 @@ study::WindowOptions mapless_windows(const Model& gates) {
 std::size_t place_of(const CampaignFiles& files, const CampaignFiles::Log& log) {
   if (files.maps.size() <= 1) return 0;
   if (!log.map)
-    throw Failure(kUsage, "--log " + log.path + " stands before the first of several --map; put it after its own");
+    throw Failure(kUsage, log.path + " follows none of the several --map; give it after its own, with --log");
   return *log.map;
 }
 
@@ -47,7 +47,7 @@ void add_campaign_options(Command& command, CampaignFiles& files) {
   command
       .add_text(
           "--map", [&files](const std::string& map) { files.maps.push_back(map); },
-          "OctoMap file or builtin:NAME of the logs that follow; optional")
+          "OctoMap file or builtin:NAME of the logs that follow; without one, no surface but a flat floor")
       .trigger_on_parse();
   command
       .add_texts(
@@ -56,8 +56,16 @@ void add_campaign_options(Command& command, CampaignFiles& files) {
             const auto map = files.maps.empty() ? std::nullopt : std::optional(files.maps.size() - 1);
             for (const auto& log : logs) files.logs.push_back({log, map});
           },
-          "flight logs: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.mcap)")
+          "flight logs, one flight each: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.mcap)")
       .trigger_on_parse();
+}
+
+void each_readable(const CampaignFiles& files, LogNotes& notes,
+                   const std::function<void(const std::string& log, std::size_t place)>& read) {
+  std::vector<std::string> paths;
+  for (const auto& file : files.logs) paths.push_back(file.path);
+  std::size_t next = 0;
+  each_readable(paths, notes, [&](const std::string& path) { read(path, place_of(files, files.logs[next++])); });
 }
 
 Campaign empty_campaign(const CampaignFiles& files) {
@@ -77,15 +85,12 @@ void read_logs(const CampaignFiles& files, const std::vector<map::OccupancyGrid>
   study::WindowOptions options;
   options.tau_w = gates.bound.tau_w;
   if (mapless) options = mapless_windows(gates);
-  std::vector<std::string> paths;
-  for (const auto& file : files.logs) paths.push_back(file.path);
-  std::size_t next = 0;
-  each_readable(paths, notes, [&](const std::string& path) {
-    const std::size_t place = place_of(files, files.logs[next++]);
+  each_readable(files, notes, [&](const std::string& path, std::size_t place) {
     const auto log = read_flight(path);
     auto flight = study::flight_windows(log, vehicle, options, path);
     if (!flight) throw Failure(kBadData, flight.error().message);
-    if (!mapless) notes.place(path, study::map_share(log, maps[place], vehicle.value_or(Vehicle{})));
+    if (!mapless)
+      notes.place({path, files.maps[place], study::map_share(log, maps[place], vehicle.value_or(Vehicle{}))});
     CalibratedLog one{path, place, flight->signal, flight->gated, flight->not_tested, flight->windows.size(), {}, {}};
     if (mapless) {
       one.map.reset();

@@ -17,7 +17,7 @@ void say(const std::string& verb, const std::string& what) {
   say_error(verb, what);
 }
 
-bool touches(const std::pair<std::string, study::MapShare>& flight) { return flight.second.all() > 0; }
+bool touches(const LogNotes::Place& place) { return place.share.all() > 0; }
 
 std::string summary(const LogNotes& notes) {
   const auto good = notes.places.size() - static_cast<std::size_t>(std::ranges::count_if(notes.places, touches));
@@ -37,14 +37,15 @@ void LogNotes::left_out(const std::string& log, const std::string& why) {
   say(verb, why + "; left out");
 }
 
-void LogNotes::place(const std::string& log, const study::MapShare& share) {
-  places.emplace_back(log, share);
+void LogNotes::place(const Place& place) {
+  places.push_back(place);
+  const auto& [log, map, share] = place;
   if (!share.refused()) return;
   char at[128];
   std::snprintf(at, sizeof at, ", first at t_s %.2f at %.2f,%.2f,%.2f", share.first->t_s, share.first->p_W.x(),
                 share.first->p_W.y(), share.first->p_W.z());
   throw Failure(kBadData, log + ":1: lies where the map lets no craft be: " + study::to_text(share) + at +
-                              "; is it this map, in its frame, heights upwards?");
+                              "; is it this map, " + map + ", in its frame, heights upwards?");
 }
 
 void each_readable(const std::vector<std::string>& logs, LogNotes& notes,
@@ -66,9 +67,12 @@ void each_readable(const std::vector<std::string>& logs, LogNotes& notes,
 
 Json told_first(const LogNotes& notes, const Json& json) {
   Json all = Json::object();
-  for (const auto& [log, share] : notes.places)
-    all["map_shares"].push_back(
-        {{"log", log}, {"inside", share.inside}, {"too_near", share.too_near}, {"outside", share.outside}});
+  for (const auto& [log, map, share] : notes.places)
+    all["map_shares"].push_back({{"log", log},
+                                 {"map", map},
+                                 {"inside", share.inside},
+                                 {"too_near", share.too_near},
+                                 {"outside", share.outside}});
   for (const auto& [log, why] : notes.logs) all["left_out"].push_back({{"log", log}, {"why", why}});
   for (const auto& [log, what] : notes.columns) all["columns_left_out"].push_back({{"log", log}, {"why", what}});
   all.update(json);
@@ -79,13 +83,13 @@ void print_text(const LogNotes& notes) {
   if (notes.places.empty()) return;
   std::printf("%s\n", summary(notes).c_str());
   for (const auto& flight : notes.places)
-    if (touches(flight)) std::printf("  %s: %s\n", flight.first.c_str(), study::to_text(flight.second).c_str());
+    if (touches(flight)) std::printf("  %s: %s\n", flight.log.c_str(), study::to_text(flight.share).c_str());
 }
 
 std::string html(const LogNotes& notes) {
   std::string rows;
   for (const auto& flight : notes.places)
-    if (touches(flight)) rows += report::row(flight.first, study::to_text(flight.second));
+    if (touches(flight)) rows += report::row(flight.log, study::to_text(flight.share));
   for (const auto& [log, why] : notes.logs) rows += report::row("Left out: " + log, why);
   for (const auto& [log, what] : notes.columns) rows += report::row(log, what);
   if (notes.places.empty() && rows.empty()) return "";

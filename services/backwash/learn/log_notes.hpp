@@ -13,17 +13,21 @@ namespace backwash::services {
 
 /// What is told of the logs of one call before anything is concluded from them.
 struct LogNotes {
-  std::string verb;                                             ///< "backwash study": begins each line on stderr
-  std::vector<std::pair<std::string, std::string>> columns;     ///< log, and what of it is not believed
-  std::vector<std::pair<std::string, std::string>> logs;        ///< left out, and why
-  std::vector<std::pair<std::string, study::MapShare>> places;  ///< of each log with a map, also of those left out
+  std::string verb;                                          ///< "backwash study": begins each line on stderr
+  std::vector<std::pair<std::string, std::string>> columns;  ///< log, and what of it is not believed
+  std::vector<std::pair<std::string, std::string>> logs;     ///< left out, and why
+  struct Place {
+    std::string log, map;
+    study::MapShare share;
+  };
+  std::vector<Place> places;  ///< of each log with a map, also of those left out
 
   /// A column is left out: on stderr at once. `what`: one sentence.
   void column(const std::string& log, const std::string& what);
   /// A log is left out: on stderr at once. `why`: with the log's name.
   void left_out(const std::string& log, const std::string& why);
-  /// Notes the share. Throws Failure 65 where it is too large.
-  void place(const std::string& log, const study::MapShare& share);
+  /// Notes the share of a log in its map. Throws Failure 65 where it is too large.
+  void place(const Place& place);
 };
 
 /// Calls `read` for each log. One that throws bad data is left out, told on stderr at once. Throws Failure: the first

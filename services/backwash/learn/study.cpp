@@ -22,7 +22,8 @@ namespace backwash::services {
 namespace {
 
 struct StudyOptions {
-  std::string map, model = "builtin:quad-5in", vehicle, report, out;
+  CampaignFiles files;
+  std::string model = "builtin:quad-5in", vehicle, report, out;
   std::vector<std::string> logs, reference;
   std::string group, from;
   unsigned seed = 1;
@@ -31,14 +32,12 @@ struct StudyOptions {
 };
 
 /// What the simulation says of the flights with the model's own terms, and with those of the causes beside them.
-std::string residuals(const StudyOptions& options, const Flights& flights, const Vehicle& vehicle, const Model& model,
-                      const map::OccupancyGrid& grid, const study::Observations& measured,
-                      const std::vector<SimulationTerm>& found, report::PageData& data) {
-  FlownAgain again{{}, {}, vehicle, model, grid, options.seed};
-  for (const std::size_t k : flights.order()) {
-    again.logs.push_back(&flights.logs[k]);
-    again.paths.push_back(flights.paths[k]);
-  }
+std::string residuals(const StudyOptions& options, const Flights& flights, const LookedWith& with, const Model& model,
+                      const study::Observations& measured, const std::vector<SimulationTerm>& found,
+                      report::PageData& data) {
+  FlownAgain again{{}, with.vehicle, model, options.seed};
+  for (const std::size_t k : flights.order())
+    again.flights.push_back({flights.logs[k], flights.paths[k], *with.rooms[flights.rooms[k]].grid});
   auto terms = read_simulation(options.model);
   progress("simulating the flights without the causes");
   const auto before = simulated(again, terms, measured);
@@ -83,7 +82,7 @@ std::optional<study::RotorVerdict> against_reference(const StudyOptions& options
 std::optional<study::calibrate::HeightEffects> height_effects(const StudyOptions& options,
                                                               const std::vector<std::string>& logs, const Model& model,
                                                               const study::Observations& seen) {
-  if (!options.map.empty() || !seen.has(study::Source::ceiling)) return std::nullopt;
+  if (!options.files.maps.empty() || !seen.has(study::Source::ceiling)) return std::nullopt;
   if (!options.from.empty())
     throw Failure(kUsage, options.from + ":1: logs with a ceiling column need a --map, or --log in place of --from");
   return read_height_effects(logs, model, options.seed);
@@ -98,18 +97,22 @@ void check_rows(const StudyOptions& options) {
   not_with(options.rows && (options.json || options.residuals || !options.reference.empty() ||
                             !(options.out + options.report + options.from + options.design.points).empty()),
            "--rows", alone);
-  not_with(!options.from.empty() && !options.logs.empty(), "--from", "takes the place of --log: give one of them");
+  not_with(!options.from.empty() && !options.files.logs.empty(), "--from",
+           "takes the place of --log: give one of them");
   not_with(!options.from.empty() && options.residuals, "--residuals", "needs the logs: give --log in place of --from");
 }
 
 void check(const StudyOptions& options) {
-  if (options.vehicle.empty() || (options.logs.empty() && options.from.empty()))
+  const bool mapless = options.files.maps.empty();
+  if (options.vehicle.empty() || (options.files.logs.empty() && options.from.empty()))
     throw Failure(kUsage, "study needs --vehicle, and --log or --from");
   check_rows(options);
-  if (options.residuals && (options.map.empty() || options.report.empty()))
+  if (options.residuals && (mapless || options.report.empty()))
     throw Failure(kUsage, "--residuals needs --map, to fly in, and --report, to draw on");
-  if (!options.reference.empty()) refuse_other_numbers(options.logs), refuse_other_numbers(options.reference);
-  check_design(options.design, options.map, options.force);
+  std::vector<std::string> paths = options.reference;
+  for (const auto& log : options.files.logs) paths.push_back(log.path);
+  if (!options.reference.empty()) refuse_other_numbers(paths);
+  check_design(options.design, mapless, options.force);
   check_outputs({options.report, options.out, options.design.points}, options.force);
 }
 
@@ -132,15 +135,17 @@ void write_model(const StudyOptions& options, const Model& model, const study::S
                  const study::Observations& seen) {
   const auto text =
       study::extended_model_text(model, result, seen, options.model, kVersion, earlier_terms(options.model));
-  write_model_file(options.out, text, options.force);
+  write_file(options.out, text, options.force, model_refusal);
 }
 
 std::optional<study::Consequence> what_it_costs(const study::StudyResult& result, const study::Observations& seen,
-                                                const Model& model, const Vehicle& vehicle,
-                                                const map::OccupancyGrid* grid) {
+                                                const Model& model, const Flights& flights, const LookedWith& with) {
   if (result.causes.empty()) return std::nullopt;
   progress("hover sets and a plan, before and after");
-  return study::consequence(result, seen, model, vehicle, grid, run_shown);
+  std::vector<const map::OccupancyGrid*> grids;
+  for (const std::size_t k : flights.order())
+    if (const auto& grid = with.rooms[flights.rooms[k]].grid) grids.push_back(&*grid);
+  return study::consequence(result, seen, model, with.vehicle, grids, run_shown);
 }
 
 void print_beside(const Flights& flights, const std::optional<study::Design>& design, const DesignOptions& asked) {
@@ -154,18 +159,22 @@ void add_left_out(Json& json, const std::vector<study::ExtensionTerm>& terms, co
   for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
 }
 
+RowsOf rows_of(const StudyOptions& options) {
+  return {options.vehicle, options.model, options.group, options.files.maps};
+}
+
 Flights read_flights(const StudyOptions& options, const LookedWith& with) {
   std::vector<StudiedFlight> studied;
   std::vector<log::FlightLog> logs;
   if (options.from.empty()) {
-    each_readable(options.logs, with.notes, [&](const auto& path) {
-      studied.push_back(look_at(path, options.group, with, options.residuals ? &logs : nullptr));
+    each_readable(options.files, with.notes, [&](const auto& path, std::size_t room) {
+      studied.push_back(look_at(path, room, options.group, with, options.residuals ? &logs : nullptr));
     });
   } else {
     progress("reading " + options.from);
-    studied = read_study_rows(options.from, {options.vehicle, options.model, options.map, options.group});
+    studied = read_study_rows(options.from, rows_of(options));
     for (const auto& flight : studied)
-      if (flight.place) with.notes.place(flight.path, *flight.place);
+      if (flight.place) with.notes.place({flight.path, with.rooms[flight.room].name, *flight.place});
   }
   progress("looking for flights that come twice");
   auto flights = each_once(std::move(studied), !options.group.empty(), std::move(logs));
@@ -174,9 +183,8 @@ Flights read_flights(const StudyOptions& options, const LookedWith& with) {
 }
 
 int print_rows(const StudyOptions& options, const LookedWith& with) {
-  each_readable(options.logs, with.notes, [&](const auto& path) {
-    const auto row = study_row(look_at(path, options.group, with, nullptr),
-                               {options.vehicle, options.model, options.map, options.group});
+  each_readable(options.files, with.notes, [&](const auto& path, std::size_t room) {
+    const auto row = study_row(look_at(path, room, options.group, with, nullptr), rows_of(options));
     end_progress();
     std::fputs(row.c_str(), stdout);
   });
@@ -192,11 +200,11 @@ int run(const StudyOptions& options) {
   const auto vehicle = read_vehicle(options.vehicle);
   auto model = read_model(options.model);
   model.ground.r0 = vehicle.body.diagonal_radius;
-  const auto room = options.map.empty() ? std::nullopt : std::optional(read_map(options.map));
-  const map::OccupancyGrid* grid = room ? &*room : nullptr;
-  study::MapView surroundings(grid, model);
+  std::deque<Room> rooms;
+  for (const auto& map : options.files.maps) rooms.emplace_back(map, model);
+  if (rooms.empty()) rooms.emplace_back("", model);
   LogNotes notes{"backwash study", {}, {}, {}};
-  const LookedWith with{vehicle, model, grid, surroundings, notes};
+  const LookedWith with{vehicle, rooms, notes};
   if (options.rows) return print_rows(options, with);
   Flights flights = read_flights(options, with);
   const auto sound = sound_flights(options, vehicle, model, notes);
@@ -214,9 +222,10 @@ int run(const StudyOptions& options) {
   if (height) json["height_effect"] = services::to_json(*height);
   const auto rotors = against_reference(options, sound, seen);
   if (rotors) json["rotors_against_reference"] = services::to_json(*rotors);
-  const auto consequence = what_it_costs(result, seen, model, vehicle, grid);
+  const auto consequence = what_it_costs(result, seen, model, flights, with);
   if (consequence) json["consequence"] = services::to_json(*consequence);
-  const auto design = designed(options.design, seen, result, model, vehicle, grid, options.force);
+  const auto& first = rooms.front().grid;
+  const auto design = designed(options.design, seen, result, model, vehicle, first ? &*first : nullptr, options.force);
   if (design) json["design"] = services::to_json(*design, options.design);
   if (!options.out.empty()) {
     write_model(options, model, result, seen);
@@ -224,12 +233,14 @@ int run(const StudyOptions& options) {
   }
   if (!options.report.empty()) {
     std::string beside = design ? html(*design, options.design) : "";
+    std::string maps;
+    for (const auto& map : options.files.maps) maps += (maps.empty() ? "" : ", ") + map;
     report::PageData data;
     if (options.residuals)
-      beside += residuals(options, flights, vehicle, model, *grid, measured, study::simulation_of(result, seen), data);
+      beside += residuals(options, flights, with, model, measured, study::simulation_of(result, seen), data);
     write_page(options, result, seen,
-               {options.map, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, data,
-                vehicle, names, html(notes)});
+               {maps, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, data, vehicle,
+                names, html(notes)});
   }
   if (!options.json) print_text(notes);
   options.json ? print(told_first(notes, json))
@@ -243,12 +254,10 @@ int run(const StudyOptions& options) {
 Verb study_verb(Command& app) {
   auto options = std::make_shared<StudyOptions>();
   auto& command = app.add_subcommand("study", "What the simulation gets wrong, by name, with the gain");
-  command.add_option("--map", options->map,
-                     "OctoMap file or builtin:NAME; without one, no surface but the floor z = 0");
+  command.add_option("logs", options->logs, "such logs, where there is one map or none");
+  add_campaign_options(command, options->files);
   command.add_option("--model", options->model, "model file or builtin:NAME").capture_default_str();
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME");
-  command.add_option("logs,--log", options->logs,
-                     "flight logs, one flight each: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.mcap)");
   command.add_flag("--rows", options->rows,
                    "prints what a study keeps of each log as a line of JSON, and nothing else");
   command.add_option("--from", options->from, "such lines, in order, in place of logs").type_name("FILE");
@@ -269,10 +278,13 @@ Verb study_verb(Command& app) {
   command.add_flag("--json", options->json, "one JSON object on stdout");
   command.add_flag("--force", options->force, "overwrite --report, --out and --design");
   command.footer(
-      "Example:\n  backwash study --map room.bt --model builtin:quad-5in --vehicle builtin:quad-5in --log flight*.csv "
-      "--report study.html --out extended.toml");
+      "Each log belongs to the --map before it (or the only one).\nExample:\n  backwash study --map room.bt --log "
+      "room-*.csv --map hall.bt --log hall-*.csv --model builtin:quad-5in --vehicle builtin:quad-5in --report "
+      "study.html "
+      "--out extended.toml");
   return {&command, [options] {
             keep_pages();
+            for (const auto& log : options->logs) options->files.logs.push_back({log, std::nullopt});
             return run(*options);
           }};
 }

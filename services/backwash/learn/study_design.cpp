@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <span>
 
+#include "core/config/route_file.hpp"
 #include "core/plan/search/ends.hpp"
 #include "core/report/page/page.hpp"
 #include "core/types/formatted.hpp"
@@ -50,13 +51,13 @@ void add_design(Command& command, DesignOptions& options) {
   command.add_option("--flight-time", options.flight_time, "of that flight, s").capture_default_str().check(positive());
 }
 
-void check_design(const DesignOptions& options, const std::string& map, bool force) {
+void check_design(const DesignOptions& options, bool mapless, bool force) {
   if (options.points.empty()) {
     if (options.start) throw Failure(kUsage, "--start is where the flight of --design begins; give that too");
     return;
   }
-  if (map.empty() || !options.start)
-    throw Failure(kUsage, "--design needs --map, to fly in, and --start, where the flight begins");
+  if (mapless || !options.start)
+    throw Failure(kUsage, "--design needs --map, to fly in, the first, and --start, where the flight begins");
   check_output(options.points, force);
 }
 
@@ -69,7 +70,12 @@ std::optional<study::Design> designed(const DesignOptions& options, const study:
   if (const auto why = plan::why_no_rest(*world, *options.start, 0))
     throw Failure(kUnavailable, "--start " + *why + ": begin where hovering is safe");
   auto design = study::design(seen, result, *world, model, *options.start, options.flight_time);
-  if (const auto* chosen = design.chosen()) write_file(options.points, study::points_csv(chosen->points), force);
+  const auto refusal = [](const std::string& path) {
+    const auto route = config::read_route(path);
+    return route ? "" : route.error().message;
+  };
+  if (const auto* chosen = design.chosen())
+    write_file(options.points, study::points_csv(chosen->points), force, refusal);
   return design;
 }
 

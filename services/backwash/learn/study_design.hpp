@@ -18,7 +18,7 @@ struct DesignOptions {
 };
 void add_design(Command& command, DesignOptions& options);
 /// Throws Failure: a usage error without map or start, 73 for a points file that exists.
-void check_design(const DesignOptions& options, const std::string& map, bool force);
+void check_design(const DesignOptions& options, bool mapless, bool force);
 
 /// The next flight, and its points file where one separates; nothing where none was asked for. Throws Failure (69)
 /// where hovering at the start is not safe. `grid`: not null where one is asked for.

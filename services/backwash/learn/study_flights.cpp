@@ -33,6 +33,7 @@ void leave_out(Flights& flights, const std::vector<std::pair<std::size_t, std::s
   if (twins.empty()) return;
   keep(flights.paths);
   keep(flights.observed);
+  keep(flights.rooms);
   keep(flights.group);
   keep(flights.logs);
 }
@@ -62,20 +63,26 @@ log::FlightLog read_studied(const std::string& path, LogNotes& notes) {
   return log;
 }
 
-StudiedFlight look_at(const std::string& path, const std::string& group, const LookedWith& with,
+Room::Room(std::string map, const Model& model)
+    : name(std::move(map)),
+      grid(name.empty() ? std::nullopt : std::optional(read_map(name))),
+      surroundings(grid ? &*grid : nullptr, model) {}
+
+StudiedFlight look_at(const std::string& path, std::size_t room, const std::string& group, const LookedWith& with,
                       std::vector<log::FlightLog>* keep) {
   progress("reading " + path);
   auto log = read_studied(path, with.notes);
   if (!group.empty() && (!log.has(group) || log.column(group).empty()))
     throw Failure(kBadData, path + ":1: no column '" + group + "' to group flights by; name one that it has");
+  Room& in = with.rooms[room];
   std::optional<study::MapShare> place;
-  if (with.grid) {
-    place = study::map_share(log, *with.grid, with.vehicle);
-    with.notes.place(path, *place);
+  if (in.grid) {
+    place = study::map_share(log, *in.grid, with.vehicle);
+    with.notes.place({path, in.name, *place});
   }
-  study::Observer observer(with.vehicle, with.surroundings);
+  study::Observer observer(with.vehicle, in.surroundings);
   observer.add(log);
-  StudiedFlight flight{path, group.empty() ? 0 : log.column(group).front(), log::FlightMark(log), observer.take(),
+  StudiedFlight flight{path, group.empty() ? 0 : log.column(group).front(), log::FlightMark(log), observer.take(), room,
                        place};
   if (keep) keep->push_back(std::move(log));
   return flight;
@@ -87,6 +94,7 @@ Flights each_once(std::vector<StudiedFlight> studied, bool grouped, std::vector<
   for (auto& flight : studied) {
     flights.paths.push_back(std::move(flight.path));
     flights.observed.push_back(std::move(flight.observed));
+    flights.rooms.push_back(flight.room);
     if (grouped) flights.group.push_back(flight.group);
     marks.push_back(std::move(flight.mark));
   }
@@ -128,7 +136,7 @@ void keep_pages() {
 
 study::Observations observations(Flights& flights, const LookedWith& with) {
   const auto order = flights.order();
-  study::Observer observer(with.vehicle, with.surroundings);
+  study::Observer observer(with.vehicle, with.rooms.front().surroundings);  // they differ in nothing that is asked here
   std::size_t windows = 0;
   for (const std::size_t k : order) windows += flights.observed[k].seen.windows.size();
   observer.expect(windows);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <string>
 #include <utility>
@@ -26,12 +27,19 @@ log::FlightLog read_flight(const std::string& path);
 /// table that the others contradict (core/log, leave_out_doubted()), which `notes` then tell. Throws Failure.
 log::FlightLog read_studied(const std::string& path, LogNotes& notes);
 
+/// A place that flights were flown in, and what was seen of it. Without a map nothing but the floor.
+struct Room {
+  Room(std::string map, const Model& model);
+  Room(const Room&) = delete;
+  const std::string name;  ///< its map as on the command line; empty: none
+  const std::optional<map::OccupancyGrid> grid;
+  study::MapView surroundings;
+};
+
 /// What flights are looked at with. Nothing here outlives the study.
 struct LookedWith {
   const Vehicle& vehicle;
-  const Model& model;
-  const map::OccupancyGrid* grid;  ///< may be null
-  study::MapView& surroundings;    ///< of the two
+  std::deque<Room>& rooms;  ///< one or more: all of maps, or one without
   LogNotes& notes;
 };
 
@@ -41,17 +49,19 @@ struct StudiedFlight {
   double group = 0;  ///< value of the column that flights are grouped by in the first row
   log::FlightMark mark;
   study::Observed observed;
+  std::size_t room;                           ///< which of the rooms
   std::optional<study::MapShare> place = {};  ///< with a map
 };
-/// Reads a log and looks at it. `group`: a column, or empty. `keep`: takes the log. Throws Failure, also where too much
-/// of the flight lies where the map lets no craft be.
-StudiedFlight look_at(const std::string& path, const std::string& group, const LookedWith& with,
+/// Reads a log of a room and looks at it. `group`: a column, or empty. `keep`: takes the log. Throws Failure, also
+/// where too much of the flight lies where the map lets no craft be.
+StudiedFlight look_at(const std::string& path, std::size_t room, const std::string& group, const LookedWith& with,
                       std::vector<log::FlightLog>* keep);
 
 /// The flights of a study, each once.
 struct Flights {
   std::vector<std::string> paths;
   std::vector<study::Observed> observed;
+  std::vector<std::size_t> rooms;
   std::vector<double> group;                               ///< empty: none
   std::vector<log::FlightLog> logs;                        ///< where they are kept
   std::vector<std::pair<std::string, std::string>> twice;  ///< left out, and which flight it is again

@@ -226,8 +226,8 @@ void print_text(const study::NamedCause& cause, const Vehicle& vehicle, const st
 /// Of study, its next flight and calibration.
 std::vector<study::Rule> all_rules() {
   auto all = study::rules();
-  for (const auto& r : study::calibrate::rules()) all.push_back(r);
-  for (const auto& r : study::design_rules()) all.push_back(r);
+  study::append_rules(all, study::calibrate::kCalibrationRules);
+  study::append_rules(all, study::kDesignRules);
   return all;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "services/backwash/learn/study_rows.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
 
@@ -23,12 +24,19 @@ std::string file_identity(const std::string& path) {
   return path.empty() || path.starts_with("builtin:") ? path : sha256_of_file(path);
 }
 
-Json made_with(const RowsOf& of) {
+Json made_with(const RowsOf& of, const std::string& map) {
   return {{"version", kVersion},
           {"vehicle", file_identity(of.vehicle)},
           {"model", file_identity(of.model)},
-          {"map", file_identity(of.map)},
+          {"map", map},
           {"group", of.group}};
+}
+
+/// Of each map; of none, one empty text.
+std::vector<std::string> map_identities(const RowsOf& of) {
+  std::vector<std::string> all;
+  for (const auto& map : of.maps) all.push_back(file_identity(map));
+  return all.empty() ? std::vector<std::string>(1) : all;
 }
 
 std::string bytes_of(const std::vector<std::size_t>& numbers) {
@@ -43,7 +51,7 @@ StudiedFlight flight_of(const Json& row) {
     throw std::out_of_range("windows");
   std::vector<std::size_t> hashes(positions->size() / sizeof(std::size_t));
   if (!hashes.empty()) std::memcpy(hashes.data(), positions->data(), positions->size());
-  StudiedFlight flight{row.at("log"), row.at("group"), log::FlightMark(std::move(hashes)), std::move(*observed)};
+  StudiedFlight flight{row.at("log"), row.at("group"), log::FlightMark(std::move(hashes)), std::move(*observed), 0};
   if (row.contains("map_share")) {
     const Json& share = row["map_share"];
     flight.place = {share.at("inside"), share.at("too_near"), share.at("outside")};
@@ -55,7 +63,7 @@ StudiedFlight flight_of(const Json& row) {
 
 std::string study_row(const StudiedFlight& flight, const RowsOf& of) {
   Json row{{"log", flight.path}, {"log_sha256", sha256_of_file(flight.path)}};
-  row["made"] = made_with(of);
+  row["made"] = made_with(of, of.maps.empty() ? "" : file_identity(of.maps[flight.room]));
   row["group"] = flight.group;
   if (const auto& place = flight.place)
     row["map_share"] = {{"inside", place->inside}, {"too_near", place->too_near}, {"outside", place->outside}};
@@ -70,7 +78,8 @@ std::string study_row(const StudiedFlight& flight, const RowsOf& of) {
 
 std::vector<StudiedFlight> read_study_rows(const std::string& path, const RowsOf& of) {
   std::vector<StudiedFlight> flights;
-  const Json made = made_with(of);
+  const auto maps = map_identities(of);
+  Json made = made_with(of, maps.front());
   std::size_t number = 0;
   const auto take = [&](std::string_view line) {
     const auto refuse = [&](const std::string& what) {
@@ -79,11 +88,14 @@ std::vector<StudiedFlight> read_study_rows(const std::string& path, const RowsOf
     ++number;
     const auto row = Json::parse(line, nullptr, false);
     if (!row.is_object() || !row.contains("made")) refuse("is no line of it, or is cut short");
+    const auto map = std::ranges::find(maps, row["made"].value("map", ""));
+    if (map != maps.end()) made["map"] = *map;
     for (const auto& [name, value] : made.items())
       if (const auto was = row["made"].value(name, Json()); was != value)
         refuse("was made with another " + name + ": " + was.dump() + ", here it is " + value.dump());
     try {
       flights.push_back(flight_of(row));
+      flights.back().room = static_cast<std::size_t>(map - maps.begin());
     } catch (const std::out_of_range&) {
       refuse("is no line of it");
     } catch (const Json::exception&) {

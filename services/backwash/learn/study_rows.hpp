@@ -12,7 +12,8 @@ namespace backwash::services {
 
 /// Files that logs are looked at with, as on the command line, and the column that groups them; empty: none.
 struct RowsOf {
-  std::string vehicle, model, map, group;
+  std::string vehicle, model, group;
+  std::vector<std::string> maps;
 };
 
 /// The line of one log, with its newline.

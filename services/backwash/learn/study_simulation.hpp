@@ -15,17 +15,20 @@ namespace backwash::services {
 
 /// Flights that were measured, in the order of their observations, and what they were flown with.
 struct FlownAgain {
-  std::vector<const log::FlightLog*> logs;
-  std::vector<std::string> paths;
+  struct Flight {
+    const log::FlightLog& log;
+    std::string path;
+    const map::OccupancyGrid& grid;
+  };
+  std::vector<Flight> flights;
   const Vehicle& vehicle;
   const Model& model;
-  const map::OccupancyGrid& grid;
   std::uint64_t seed;
 };
 
 /// What the simulation in the model's own air, with these terms, says of each measured window: mean over four flights
 /// with other gusts. Throws Failure 65 for a log without set-points. On all processors.
-study::Told simulated(const FlownAgain& flights, const std::vector<SimulationTerm>& terms,
+study::Told simulated(const FlownAgain& again, const std::vector<SimulationTerm>& terms,
                       const study::Observations& measured);
 
 }  // namespace backwash::services

@@ -143,7 +143,8 @@ int fit_vehicle(const VehicleFitOptions& options) {
   progress("fitting the loop");
   const auto fit = fit_those_that_tell(named, vehicle, notes);
   if (!options.out.empty() && fit.unexcited.empty())
-    write_file(options.out, proposal(fit, options.vehicle, named), options.force);
+    write_file(options.out, proposal(fit, options.vehicle, named), options.force,
+               [&](const std::string& path) { return vehicle_refusal(path, options.vehicle); });
   options.json ? print(told_first(notes, to_json(fit, named, vehicle))) : print_text(fit, vehicle);
   if (!fit.unexcited.empty()) throw Failure(kBadData, unexcited_line(fit.unexcited));
   if (!options.out.empty() && !options.json) std::printf("proposal written to %s\n", options.out.c_str());

@@ -127,7 +127,10 @@ TEST(SameGusts, AFlightUnderOtherStampsAndWithALittleNoiseIsFoundAndNoOther) {
       if (copy.names[c].starts_with("a")) row[c] += 0.02 * draw(rng);
     }
   const auto folder = std::filesystem::temp_directory_path() / ("same-gusts-" + std::to_string(getpid()));
-  const auto same = same_gusts(study_worlds::observe(world, flights, folder));
+  const auto seen = study_worlds::observe(world, flights, folder);
+  std::vector<Gusts> gusts;
+  for (std::size_t f = 0; f < seen.flights; ++f) gusts.push_back(gusts_of(seen, f));
+  const auto same = same_gusts(std::move(gusts));
   std::filesystem::remove_all(folder);
   ASSERT_EQ(same.size(), 11u);
   for (std::size_t f = 0; f < 10; ++f) EXPECT_EQ(same[f], f) << "flown again along the same way: 8 and 9";

@@ -250,7 +250,7 @@ TEST(Study, TellsASaggingBatteryFromEqualStartsWithoutAFalseNameBesideIt) {
 TEST(Gaps, AGapIsLongerThanFivePeriodsAndFiftyMilliseconds) {
   std::vector<double> t;
   for (int k = 0; k < 100; ++k) t.push_back(0.01 * k + (k >= 40 ? 0.03 : 0) + (k >= 70 ? 0.06 : 0));  // 0.04 s, 0.07 s
-  const auto stretches = unbroken(t, {});
+  const auto stretches = unbroken(t);
   ASSERT_EQ(stretches.size(), 2u);
   EXPECT_EQ(stretches[0].end, 70u);
   EXPECT_EQ(stretches[1].end, 100u);

@@ -125,8 +125,8 @@ TEST(Windows, DividesOutTheAttenuationOfTheLoopWithoutSetPoints) {
   loop::PositionLoop loop;
   loop.kp.setConstant(6);
   loop.kd.setConstant(4);
-  EXPECT_NEAR(loop_attenuation(loop, 0, 0.2, {}), 0.64, 0.005);
-  EXPECT_NEAR(loop_attenuation(loop, 0, 0.5, {}), 0.39, 0.005);
+  EXPECT_NEAR(loop_attenuation(loop, 0, 0.2, {1e-4, 1e5 / 0.2}), 0.64, 0.005);
+  EXPECT_NEAR(loop_attenuation(loop, 0, 0.5, {1e-4, 1e5 / 0.5}), 0.39, 0.005);
   // A push of that correlation time, through the simulated vehicle, logged without set-points.
   auto vehicle = five_inch();
   vehicle.controller.kp = {6, 6};

@@ -14,12 +14,6 @@ std::optional<std::string> not_under_one(const Observations& seen) {
 
 double near_ceiling(double gap, double length) { return near_surface(gap, kCeilingReference, length); }
 
-/// Mean of amount(gap, scale) along the window.
-template <typename F>
-double by_gap(const WindowRow& w, const Scale& scale, F amount) {
-  return along(w, [&](auto& at) { return amount(at.ceiling_gap, scale.value); });
-}
-
 const Reference under = {kCeilingReference, "m under the surface", [](auto& w) { return w.around.ceiling_gap; }};
 
 Reach wash() {
@@ -39,20 +33,13 @@ Form pull() {
           .floor = 0.02,
           .needs = {Source::ceiling},
           .not_flown = not_under_one,
-          .columns =
-              [](const Windows& ws, const Scale& length) {
-                return std::vector{lifting(ws, [&](auto& at) { return near_ceiling(at.ceiling_gap, length.value); })};
-              },
+          .columns = lifts([](auto& at, double length) { return near_ceiling(at.ceiling_gap, length); }),
           .shapes = {{.formula = "z push A (0.3 m/d)^n",
                       .parameters = {},
                       .scale_name = "n",
                       .scales = scales_of({1.0, 3.0}),
-                      .columns =
-                          [](const Windows& ws, const Scale& n) {
-                            return std::vector{lifting(ws, [&](auto& at) {
-                              return power_of_distance(at.ceiling_gap, kCeilingReference, n.value);
-                            })};
-                          }}},
+                      .columns = lifts(
+                          [](auto& at, double n) { return power_of_distance(at.ceiling_gap, kCeilingReference, n); })}},
           .extend = extends(Law::push_under_surface),
           .simulate = simulates(Law::push_under_surface)};
 }
@@ -68,10 +55,9 @@ Form gusts() {
           .floor = 0.12,
           .needs = {Source::ceiling},
           .not_flown = not_under_one,
-          .columns =
-              [](const Windows& ws, const Scale& length) {
-                return std::vector{in_variance(ws, [&](auto& w) { return by_gap(w, length, near_ceiling); })};
-              },
+          .columns = scatters([](auto& w, auto& length) {
+            return along(w, [&](auto& at) { return near_ceiling(at.ceiling_gap, length.value); });
+          }),
           .extend = extends(Law::ln_variance_under_surface),
           .simulate = simulates(Law::ln_variance_under_surface)};
 }

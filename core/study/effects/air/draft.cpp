@@ -32,9 +32,7 @@ Effect draft() {
                      .extend = as_told,
                      .simulate = in_the_plane}},
           .axis = {"yaw, rad", false, [](auto& w) { return w.yaw(); }},
-          .remedy = [](auto&, auto&) {
-            return Remedy{RemedyIn::place, {}, "Find what moves the air: a fan, a vent, a window or a door."};
-          }};
+          .remedy = always(RemedyIn::place, "Find what moves the air: a fan, a vent, a window or a door.")};
 }
 
 }  // namespace backwash::study

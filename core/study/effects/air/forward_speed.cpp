@@ -50,7 +50,7 @@ double to_power(const WindowRow& w, const Scale& n) {
 }
 
 /// ln of variances that add, 1 + (v/knee)², over its value at 1 m/s.
-double added(const WindowRow& w, const Scale& knee) {
+double gusts_that_add(const WindowRow& w, const Scale& knee) {
   const double at_pace = std::log1p(1 / (knee.value * knee.value));
   return of_gusts(w, knee, [&](double v) { return std::log1p(std::pow(v / knee.value, 2)) / at_pace; });
 }
@@ -67,10 +67,7 @@ Effect forward_speed() {
                      .priors = {{kPriors.typical_push}},
                      .reference = pace,
                      .floor = 0.02,
-                     .columns =
-                         [](const Windows& ws, const Scale&) {
-                           return std::vector{in(kMeanZ, ws, [](auto& w) { return speed_power(w, 2); })};
-                         },
+                     .columns = shows(kMeanZ, [](auto& w, auto&) { return speed_power(w, 2); }),
                      .extend = extends(Law::push_with_speed),
                      .simulate = simulates(Law::push_with_speed)},
                     {.formula = "ln variance + B (v/1 m/s)^n",
@@ -81,18 +78,12 @@ Effect forward_speed() {
                      .scales = scales_of({1, 2}),
                      .by_size = true,
                      .floor = 0.12,
-                     .columns =
-                         [](const Windows& ws, const Scale& n) {
-                           return std::vector{in_variance(ws, [&](auto& w) { return to_power(w, n); })};
-                         },
+                     .columns = scatters(to_power),
                      .shapes = {{.formula = "ln variance + B ln(1 + (v/u)^2)/ln(1 + (1 m/s/u)^2): gusts that add",
                                  .parameters = {},
                                  .scale_name = "u_mps",
                                  .scales = scales_of({0.5, 1, 2}),
-                                 .columns =
-                                     [](const Windows& ws, const Scale& knee) {
-                                       return std::vector{in_variance(ws, [&](auto& w) { return added(w, knee); })};
-                                     }}},
+                                 .columns = scatters(gusts_that_add)}},
                      .extend = extends(Law::ln_variance_with_speed),
                      .simulate = simulates(Law::ln_variance_with_speed)}},
           .axis = {"speed, m/s", false, [](auto& w) { return w.speed; }},

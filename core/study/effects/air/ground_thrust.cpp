@@ -7,11 +7,6 @@ namespace backwash::study {
 
 /// The wash that comes back from the surface below lifts.
 Effect ground_thrust() {
-  const auto lift = [](auto amount) {
-    return [amount](const Windows& ws, const Scale& scale) {
-      return std::vector{lifting(ws, [&](auto& at) { return amount(at.height, scale.value); })};
-    };
-  };
   return {
       .name = "ground_thrust",
       .forms = {{.formula = "z push A exp(-(h - 0.4 m)/L), h the height over the surface below",
@@ -26,13 +21,15 @@ Effect ground_thrust() {
                            "a wash is felt within two or three diameters of a rotor; farther it is a slope by height"},
                  .by_place = true,
                  .floor = 0.02,
-                 .columns = lift([](double h, double length) { return near_surface(h, kSurfaceReference, length); }),
+                 .columns =
+                     lifts([](auto& at, double length) { return near_surface(at.height, kSurfaceReference, length); }),
                  .shapes = {{.formula = "z push A (0.4 m/h)^n",
                              .parameters = {},
                              .scale_name = "n",
                              .scales = scales_of({1.0, 3.0}),
-                             .columns =
-                                 lift([](double h, double n) { return power_of_distance(h, kSurfaceReference, n); })}},
+                             .columns = lifts([](auto& at, double n) {
+                               return power_of_distance(at.height, kSurfaceReference, n);
+                             })}},
                  .extend = extends(Law::push_over_surface),
                  .simulate = simulates(Law::push_over_surface)}},
       .axis = {"height over the surface, m", false, [](auto& w) { return w.around.height; }},

@@ -16,12 +16,9 @@ Effect heavy_tails() {
                  .one_sided = true,
                  .unknowable =
                      [](const Observations&) { return kWindowRules.scatter2 / 2; },  // what of the wander is within 1 s
-                 .columns = [](const Windows& ws,
-                               const Scale&) { return std::vector{in(kTail, ws, [](auto&) { return 1.0; })}; },
+                 .columns = shows(kTail, [](auto&, auto&) { return 1.0; }),
                  .simulate = simulates(SimulationTerm::Kind::kurtosis)}},
-      .remedy = [](auto&, auto&) {
-        return Remedy{RemedyIn::model, {}, "Raise bound.kappa of the model file: gusts come in bursts."};
-      }};
+      .remedy = always(RemedyIn::model, "Raise bound.kappa of the model file: gusts come in bursts.")};
 }
 
 }  // namespace backwash::study

@@ -34,20 +34,14 @@ Effect recirculation() {
                      .scales = scales_of({8, 20, 50}),
                      .floor = 0.12,
                      .not_flown = not_indoors,
-                     .columns =
-                         [](const Windows& ws, const Scale& tau) {
-                           return std::vector{in_variance(ws, [&](auto& w) { return 1 - std::exp(-w.t / tau.value); })};
-                         },
+                     .columns = scatters([](auto& w, auto& tau) { return 1 - std::exp(-w.t / tau.value); }),
                      .shapes = {{.formula = "ln variance + B t^2/(t^2 + tau^2): the wash first has to come round",
                                  .parameters = {},
                                  .scale_name = "tau_s",
                                  .scales = scales_of({8, 20, 50}),
-                                 .columns =
-                                     [](const Windows& ws, const Scale& tau) {
-                                       return std::vector{in_variance(ws, [&](auto& w) {
-                                         return w.t * w.t / (w.t * w.t + tau.value * tau.value);
-                                       })};
-                                     }}},
+                                 .columns = scatters([](auto& w, auto& tau) {
+                                   return w.t * w.t / (w.t * w.t + tau.value * tau.value);
+                                 })}},
                      .extend = largest,
                      .simulate = simulates(SimulationTerm::Kind::ln_variance_with_time)}},
           .manoeuvres = {{"hover for five minutes in one spot, motors never stopped",

@@ -14,10 +14,7 @@ Effect command_latency() {
                      .least = 0.015,
                      .needs = {Source::setpoints},
                      .unknowable = [](const Observations& seen) { return seen.row_period / 4; },
-                     .columns =
-                         [](const Windows& ws, const Scale&) {
-                           return std::vector{in(kCommandDelayH, ws, [](auto& w) { return w.command_gain[0]; })};
-                         },
+                     .columns = shows(kCommandDelayH, [](auto& w, auto&) { return w.command_gain[0]; }),
                      .simulate = simulates(SimulationTerm::Kind::setpoint_delay)}},
           .remedy =
               [](auto& fitted, auto& v) {

@@ -71,17 +71,14 @@ Form with_temperature() {
 
 /// The accelerometer's bias wanders with the time of flight or with its temperature.
 Effect imu_drift() {
-  return {
-      .name = "imu_drift",
-      .forms = {with_time(), with_temperature()},
-      .remedy =
-          [](auto&, auto&) {
-            return with_craft("Calibrate the accelerometer over its temperature, or let it warm up before take-off.");
-          },
-      .manoeuvres = {{"start warm and start cold, the same spot and battery", [](WindowRow& w, double s) {
-                        w.temperature += s < 0.5 ? 0.0 : 12.0;
-                        w.t = 30;
-                      }}}};
+  return {.name = "imu_drift",
+          .forms = {with_time(), with_temperature()},
+          .remedy = always(RemedyIn::craft,
+                           "Calibrate the accelerometer over its temperature, or let it warm up before take-off."),
+          .manoeuvres = {{"start warm and start cold, the same spot and battery", [](WindowRow& w, double s) {
+                            w.temperature += s < 0.5 ? 0.0 : 12.0;
+                            w.t = 30;
+                          }}}};
 }
 
 }  // namespace backwash::study

@@ -23,11 +23,9 @@ Effect trim() {
                      .extend = unknown_push,
                      .simulate = simulates(SimulationTerm::Kind::push_of_heading)}},
           .axis = {"yaw, rad", false, [](auto& w) { return w.yaw(); }},
-          .remedy =
-              [](auto&, auto&) {
-                return with_craft(
-                    "Level the craft anew: calibrate the autopilot's level horizon, and look for a bent arm or motor.");
-              },
+          .remedy = always(
+              RemedyIn::craft,
+              "Level the craft anew: calibrate the autopilot's level horizon, and look for a bent arm or motor."),
           .manoeuvres = {{"turn a full yaw turn on the spot, far from walls", [](WindowRow& w, double s) {
                             w.R_WB = Eigen::AngleAxisd(2 * std::numbers::pi * s, Vec3::UnitZ()).toRotationMatrix();
                             w.around.walls.clear();

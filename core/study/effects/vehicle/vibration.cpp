@@ -46,9 +46,8 @@ Effect vibration() {
                      },
                  .simulate = [](const FittedForm&,
                                 const Observations& seen) { return std::vector{rotor_lines(seen)}; }}},
-      .remedy = [](auto&, auto&) {
-        return with_craft("Balance the propellers, and look for loose motors and a worn damping of the autopilot.");
-      }};
+      .remedy = always(RemedyIn::craft,
+                       "Balance the propellers, and look for loose motors and a worn damping of the autopilot.")};
 }
 
 }  // namespace backwash::study

@@ -8,11 +8,12 @@
 #include <utility>
 
 #include "core/types/quantile.hpp"
+
 namespace backwash::study {
 namespace {
 
-/// Rows whose position is exactly that of the row before, at least frozen_rows and so many seconds in a row.
-std::vector<char> frozen_rows(const log::FlightLog& log, const std::vector<std::size_t>& rows, double seconds) {
+/// Rows whose position is exactly that of the row before, as many and as long as the rules say.
+std::vector<char> frozen_rows(const log::FlightLog& log, const std::vector<std::size_t>& rows) {
   const auto &x = log.column("x_m"), &y = log.column("y_m"), &z = log.column("z_m");
   const auto repeats = [&](std::size_t k) {
     const std::size_t i = rows[k], last = rows[k - 1];
@@ -23,7 +24,7 @@ std::vector<char> frozen_rows(const log::FlightLog& log, const std::vector<std::
     std::size_t end = k;
     while (end < rows.size() && repeats(end)) ++end;
     if (static_cast<double>(end - k + 1) >= kWindowRules.frozen_rows &&
-        log.t_s[rows[end - 1]] - log.t_s[rows[k - 1]] >= seconds)
+        log.t_s[rows[end - 1]] - log.t_s[rows[k - 1]] >= kWindowRules.frozen)
       std::fill(frozen.begin() + static_cast<std::ptrdiff_t>(k - 1), frozen.begin() + static_cast<std::ptrdiff_t>(end),
                 char{1});
     k = std::max(end, k + 1);
@@ -40,12 +41,13 @@ const char* to_string(Gate gate) noexcept {
 
 bool ByName::operator()(Gate a, Gate b) const noexcept { return std::strcmp(to_string(a), to_string(b)) < 0; }
 
-std::vector<SampleRange> unbroken(const std::vector<double>& t, const WindowOptions& options) {
+std::vector<SampleRange> unbroken(const std::vector<double>& t) {
   if (t.empty()) return {};
   std::vector<double> spacing;
   for (std::size_t i = 1; i < t.size(); ++i) spacing.push_back(t[i] - t[i - 1]);
   const double longest =
-      spacing.empty() ? 0 : std::max(options.gap_s, options.gap_periods * quantile(std::move(spacing), 0.5));
+      spacing.empty() ? 0
+                      : std::max(kWindowRules.gap.value, kWindowRules.gap_periods * quantile(std::move(spacing), 0.5));
   std::vector<SampleRange> stretches{{0, 1}};
   for (std::size_t i = 1; i < t.size(); ++i) {
     if (t[i] - t[i - 1] > longest) stretches.push_back({i, i});
@@ -54,13 +56,28 @@ std::vector<SampleRange> unbroken(const std::vector<double>& t, const WindowOpti
   return stretches;
 }
 
-LogGates::LogGates(const log::FlightLog& log, std::vector<std::size_t> rows, const std::optional<Vehicle>& vehicle,
-                   const WindowOptions& options)
-    : log_(log),
-      rows_(std::move(rows)),
-      vehicle_(vehicle),
-      options_(options),
-      frozen_(frozen_rows(log, rows_, options.frozen_s)) {
+std::vector<SampleRange> cut(const Series& s) {
+  constexpr double kLength = kWindowRules.window_length;
+  constexpr auto kFewest = static_cast<std::size_t>(kWindowRules.fewest_rows);
+  std::vector<SampleRange> windows;
+  for (const auto& [from, to] : unbroken(s.t))
+    for (std::size_t begin = from; begin < to;) {
+      std::size_t end = begin + 1;
+      while (end < to && s.segment[end] == s.segment[begin]) ++end;
+      const double length = s.t[end - 1] - s.t[begin];
+      const double most = static_cast<double>(end - begin) / (kFewest - 1);  // of parts that hold enough samples
+      const auto parts = static_cast<std::size_t>(std::lround(length / kLength < most ? length / kLength : 0.0));
+      for (std::size_t k = 0; k < parts; ++k) {
+        const std::size_t a = begin + k * (end - begin) / parts, b = begin + (k + 1) * (end - begin) / parts;
+        if (b - a >= kFewest) windows.push_back({a, b});
+      }
+      begin = end;
+    }
+  return windows;
+}
+
+LogGates::LogGates(const log::FlightLog& log, std::vector<std::size_t> rows, const std::optional<Vehicle>& vehicle)
+    : log_(log), rows_(std::move(rows)), vehicle_(vehicle), frozen_(frozen_rows(log, rows_)) {
   for (const char* name : {"motor1", "motor2", "motor3", "motor4"})
     if (log.has(name)) motors_.push_back(&log.column(name));
   commands_ = motors_;
@@ -85,7 +102,7 @@ std::optional<double> LogGates::hover_thrust() const {
   for (double held = squares / sum;;) {
     std::vector<double> flown;
     for (const double share : shares)
-      if (share >= options_.perched_thrust * held) flown.push_back(share);
+      if (share >= kWindowRules.perched_thrust * held) flown.push_back(share);
     const double next = quantile(std::move(flown), 0.5);
     if (next == held) return held;
     held = next;
@@ -95,7 +112,7 @@ std::optional<double> LogGates::hover_thrust() const {
 bool LogGates::rotors_rest(SampleRange w) const {
   if (motors_.size() < 4) return false;
   for (std::size_t k = w.begin; k < w.end; ++k)
-    if (std::all_of(motors_.begin(), motors_.end(), [&](auto* m) { return (*m)[rows_[k]] <= options_.idle; }))
+    if (std::all_of(motors_.begin(), motors_.end(), [&](auto* m) { return (*m)[rows_[k]] <= kWindowRules.idle; }))
       return true;
   return false;
 }
@@ -113,14 +130,15 @@ bool LogGates::perched(SampleRange w) const {
     const double middle = mean([&](std::size_t row) { return x[row]; });
     most = std::max(most, mean([&](std::size_t row) { return std::pow(x[row] - middle, 2); }));
   }
-  if (std::sqrt(most) < options_.perched_m || rotors_rest(w)) return true;
+  if (std::sqrt(most) < kWindowRules.perched_spread || rotors_rest(w)) return true;
   if (hover_thrust_) {
     const auto& u = log_.column("thrust");
-    if (mean([&](std::size_t row) { return share_of(u[row]); }) < options_.perched_thrust * *hover_thrust_) return true;
+    if (mean([&](std::size_t row) { return share_of(u[row]); }) < kWindowRules.perched_thrust * *hover_thrust_)
+      return true;
   }
   if (!log_.has("stood_z_m")) return false;
   const auto &z = log_.column("z_m"), &stood = log_.column("stood_z_m");
-  return mean([&](std::size_t row) { return z[row] - stood[row]; }) < options_.clear_m;
+  return mean([&](std::size_t row) { return z[row] - stood[row]; }) < kWindowRules.clear;
 }
 
 std::optional<Gate> LogGates::operator()(SampleRange w) const {
@@ -131,32 +149,34 @@ std::optional<Gate> LogGates::operator()(SampleRange w) const {
   for (std::size_t k = w.begin; k < w.end; ++k)
     saturated += std::any_of(commands_.begin(), commands_.end(), [&](auto* c) {
       const double u = (*c)[rows_[k]];
-      return u <= options_.limit || u >= 1 - options_.limit;
+      return u <= kWindowRules.rotor_limit || u >= 1 - kWindowRules.rotor_limit;
     });
-  if (static_cast<double>(saturated) > options_.saturated_share * static_cast<double>(w.size())) return Gate::saturated;
+  if (static_cast<double>(saturated) > kWindowRules.saturated_share * static_cast<double>(w.size()))
+    return Gate::saturated;
   return std::nullopt;
 }
 
 bool simulated(const Series& s) { return s.simulated_by_thrust || !s.a_nominal.empty(); }
 
-bool under_way(const Series& s, SampleRange w, const WindowOptions& options) {
+bool under_way(const Series& s, SampleRange w) {
   for (std::size_t a = w.begin, b = w.begin; b < w.end; ++b) {
-    while (s.t[b] - s.t[a] > options.still_s) ++a;
+    while (s.t[b] - s.t[a] > kWindowRules.still_time) ++a;
     const double time = s.t[b] - s.t[a];
-    if (time > kWindowRules.still_enough * options.still_s && (s.p[b] - s.p[a]).norm() > options.still_mps * time)
+    if (time > kWindowRules.still_enough * kWindowRules.still_time &&
+        (s.p[b] - s.p[a]).norm() > kWindowRules.still_speed * time)
       return true;
   }
   return false;
 }
 
-std::optional<Gate> unfit(const Series& s, const log::FlightLog& log, SampleRange w, const WindowOptions& options) {
-  if (!simulated(s) && !log.has("motor1") && under_way(s, w, options)) return Gate::transit;
+std::optional<Gate> unfit(const Series& s, const log::FlightLog& log, SampleRange w) {
+  if (!simulated(s) && !log.has("motor1") && under_way(s, w)) return Gate::transit;
   if (!s.has_velocity) return std::nullopt;
   const double time = s.t[w.end - 1] - s.t[w.begin];
   Vec3 flown = Vec3::Zero();
   for (std::size_t i = w.begin + 1; i < w.end; ++i) flown += 0.5 * (s.v[i] + s.v[i - 1]) * (s.t[i] - s.t[i - 1]);
   const Vec3 off = s.p[w.end - 1] - s.p[w.begin] - flown;  // position and velocity must tell the same story
-  if ((off / time).norm() > options.inconsistent_mps) return Gate::inconsistent;
+  if ((off / time).norm() > kWindowRules.inconsistent) return Gate::inconsistent;
   return std::nullopt;
 }
 

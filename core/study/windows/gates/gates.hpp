@@ -6,21 +6,22 @@
 
 #include "core/log/columns/flight_log.hpp"
 #include "core/study/windows/gates/gate.hpp"
-#include "core/study/windows/gates/window_options.hpp"
+#include "core/study/windows/gates/window_rules.hpp"
 #include "core/study/windows/stretch.hpp"
 #include "core/types/vehicle.hpp"
 
 namespace backwash::study {
 
 /// Stretches of rows without a gap, t their times, s, rising. O(rows).
-std::vector<SampleRange> unbroken(const std::vector<double>& t, const WindowOptions& options);
+std::vector<SampleRange> unbroken(const std::vector<double>& t);
+/// Windows of kWindowRules.window_length, to the nearest whole number in each stretch of one segment.
+std::vector<SampleRange> cut(const Series& s);
 
 /// What leaves a window out whatever it is for, calibration or study. The log must outlive it.
 class LogGates {
  public:
   /// `rows`: those of the log that count, ascending, their times rising; needs x_m y_m z_m.
-  LogGates(const log::FlightLog& log, std::vector<std::size_t> rows, const std::optional<Vehicle>& vehicle,
-           const WindowOptions& options);
+  LogGates(const log::FlightLog& log, std::vector<std::size_t> rows, const std::optional<Vehicle>& vehicle);
 
   /// Why a window is left out, the first that holds: frozen (the position repeats in some of its rows); perched (no
   /// motion, mean thrust far below what this log holds in the air, rotors told to rest in some row, or hardly above
@@ -37,7 +38,6 @@ class LogGates {
   const log::FlightLog& log_;
   std::vector<std::size_t> rows_;
   std::optional<Vehicle> vehicle_;
-  WindowOptions options_;
   std::optional<double> hover_thrust_;                // the log's own, as thrust_share; without thrust none
   std::vector<char> frozen_;                          // per row
   std::vector<const std::vector<double>*> motors_;    // those that are logged
@@ -48,11 +48,11 @@ class LogGates {
 /// and a − a_sim is a residual in hover alone.
 bool simulated(const Series& s);
 
-/// Whether the vehicle goes somewhere in the window: faster than still_mps over still_s.
-bool under_way(const Series& s, SampleRange w, const WindowOptions& options = {});
+/// Whether the vehicle goes somewhere in the window: faster than kWindowRules.still_speed over still_time.
+bool under_way(const Series& s, SampleRange w);
 
 /// What leaves a window out of a study beside LogGates: transit (under way, not simulated, and without motor commands,
 /// which could be compared all the same); inconsistent (position and velocity). Nothing if it is good.
-std::optional<Gate> unfit(const Series& s, const log::FlightLog& log, SampleRange w, const WindowOptions& options);
+std::optional<Gate> unfit(const Series& s, const log::FlightLog& log, SampleRange w);
 
 }  // namespace backwash::study

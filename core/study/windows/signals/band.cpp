@@ -70,10 +70,8 @@ std::vector<double> band_passed(std::span<const double> signal, double rate_hz, 
   return {x.begin() + static_cast<std::ptrdiff_t>(pad), x.begin() + static_cast<std::ptrdiff_t>(pad + n)};
 }
 
-double loop_attenuation(const loop::PositionLoop& loop, int axis, double tau_w, const std::optional<Band>& band) {
-  // Even steps in ln f: the integrand is smooth in it from far below to far above every corner.
-  const double low = std::log(band ? band->low_hz : kWindowRules.integral_low),
-               high = std::log(band ? band->high_hz : kWindowRules.integral_high / tau_w);
+double loop_attenuation(const loop::PositionLoop& loop, int axis, double tau_w, const Band& band) {
+  const double low = std::log(band.low_hz), high = std::log(band.high_hz);  // even steps in ln f: smooth in it
   const int steps = static_cast<int>(std::ceil((high - low) / kWindowRules.integral_step));
   double passed = 0, whole = 0;
   for (int i = 0; i < steps; ++i) {

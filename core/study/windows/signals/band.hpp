@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,8 +25,8 @@ struct Band {
 std::vector<double> band_passed(std::span<const double> signal, double rate_hz, const Band& band);
 
 /// var(a)/var(w) of a loop along an axis, for a disturbance w of correlation time tau_w (s; spectrum 1/(1 + (2πfτ)²)):
-/// ∫|H|²S / ∫S (docs/model.md section 3; 0.64 at τ = 0.2 s and 0.39 at 0.5 s for gains (6, 4)). With a band, both
-/// integrals run over it; without, over all frequencies. Numerical, relative error below 1e-4.
-double loop_attenuation(const loop::PositionLoop& loop, int axis, double tau_w, const std::optional<Band>& band);
+/// ∫|H|²S / ∫S (docs/model.md section 3; 0.64 at τ = 0.2 s and 0.39 at 0.5 s for gains (6, 4)). Both integrals
+/// run over the band. Numerical, relative error below 1e-4.
+double loop_attenuation(const loop::PositionLoop& loop, int axis, double tau_w, const Band& band);
 
 }  // namespace backwash::study

@@ -86,10 +86,4 @@ std::vector<std::size_t> same_gusts(std::vector<Gusts> flights) {
   return same;
 }
 
-std::vector<std::size_t> same_gusts(const Observations& seen) {
-  std::vector<Gusts> flights;
-  for (std::size_t f = 0; f < seen.flights; ++f) flights.push_back(gusts_of(seen, f));
-  return same_gusts(std::move(flights));
-}
-
 }  // namespace backwash::study

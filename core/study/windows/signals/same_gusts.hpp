@@ -20,6 +20,5 @@ Gusts gusts_of(const Observations& seen, std::size_t flight);
 /// the other under other stamps, other units or a little noise. Windows are compared by their time since take-off
 /// (kWindowRules.same_gusts and what follows it), each with each: 0.15 µs a pair of flights of 15 windows.
 std::vector<std::size_t> same_gusts(std::vector<Gusts> flights);
-std::vector<std::size_t> same_gusts(const Observations& seen);
 
 }  // namespace backwash::study

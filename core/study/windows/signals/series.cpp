@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/log/columns/log_columns.hpp"
 #include "core/study/windows/gates/window_rules.hpp"
@@ -91,7 +92,8 @@ void read_commands(Series& s, std::span<const Setpoint> commands, const Vehicle&
 }  // namespace
 
 std::optional<int> segment_of(double logged) {
-  const auto number = static_cast<int>(std::lround(std::clamp(logged, -1.0, kWindowRules.segments.value)));
+  const auto number =
+      static_cast<int>(std::lround(std::clamp(logged, -1.0, static_cast<double>(std::numeric_limits<int>::max()))));
   return number >= 0 ? std::optional(number) : std::nullopt;
 }
 

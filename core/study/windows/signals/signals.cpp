@@ -33,7 +33,7 @@ std::vector<double> slow_course(std::span<const double> t, std::span<const doubl
   const auto at = Eigen::Map<const Eigen::ArrayXd>(t.data(), n);
   const double low = at.minCoeff(), length = std::max(at.maxCoeff() - low, kWindowRules.stamp_error.value);
   const double windows = static_cast<double>(n);
-  Eigen::MatrixXd powers(n, windows < kWindowRules.voltage_line ? 1 : windows < kWindowRules.voltage_parabola ? 2 : 3);
+  Eigen::MatrixXd powers(n, windows < kWindowRules.voltage_line ? 1 : windows < 2 * kWindowRules.voltage_line ? 2 : 3);
   powers.col(0).setOnes();
   for (Eigen::Index k = 1; k < powers.cols(); ++k) powers.col(k) = powers.col(k - 1).array() * (at - low) / length;
   const auto values = Eigen::Map<const Eigen::VectorXd>(x.data(), n);

@@ -28,7 +28,7 @@ Texture texture_of(const std::vector<Residual>& windows, double rate_hz) {
   std::size_t shortest = SIZE_MAX;
   for (const auto& w : windows)
     if (w.comparable) shortest = std::min(shortest, w.x[0].size());
-  for (double seconds = kWindowRules.noise_near; seconds <= kWindowRules.noise_far;
+  for (double seconds = kWindowRules.noise_near; seconds <= kWindowRules.window_length / 2;
        seconds += kWindowRules.noise_between) {
     const auto lag = static_cast<std::size_t>(std::lround(seconds * rate_hz));
     if (lag > 2 && lag + static_cast<std::size_t>(kWindowRules.noise_overlap) < shortest &&

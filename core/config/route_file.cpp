@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "services/backwashctl/route.hpp"
+#include "core/config/route_file.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,8 @@
 #include <sstream>
 
 #include "core/files/read_file.hpp"
-#include "services/command_line/exit_code.hpp"
 
-namespace backwash::ctl {
+namespace backwash::config {
 namespace {
 
 constexpr std::size_t kMostWaypoints = 64;  // of the IDL's sequence
@@ -33,12 +32,13 @@ std::optional<Waypoint> waypoint(const std::string& line, bool facing) {
 
 }  // namespace
 
-tl::expected<std::vector<Waypoint>, RouteError> read_route(const std::string& path) {
-  const auto fail = [&](int code, const std::string& where, const std::string& why) {
-    return tl::make_unexpected(RouteError{code, path + where + ": " + why});
+tl::expected<std::vector<Waypoint>, ConfigError> read_route(const std::string& path) {
+  const auto fail = [&](const std::string& where, const std::string& why,
+                        ConfigError::Kind kind = ConfigError::Kind::invalid) {
+    return tl::make_unexpected(ConfigError{kind, path + where + ": " + why});
   };
   auto content = files::read_file(path, files::kLargestConfiguration, "a points CSV file");
-  if (!content) return fail(kNoInput, "", content.error().message);
+  if (!content) return fail("", content.error().message, ConfigError::Kind::not_found);
   std::istringstream file(std::move(*content));
   std::string line;
   const auto next = [&] {
@@ -49,20 +49,19 @@ tl::expected<std::vector<Waypoint>, RouteError> read_route(const std::string& pa
   next();
   const bool facing = line == kHeadings;
   if (!facing && line != kPlaces)
-    return fail(kBadData, ":1", "the first line is '" + line + "', expected " + kPlaces + " or " + kHeadings);
+    return fail(":1", "the first line is '" + line + "', expected " + kPlaces + " or " + kHeadings);
   std::vector<Waypoint> route;
   for (int number = 2; next(); ++number) {
     const auto row = waypoint(line, facing);
     if (!row)
-      return fail(kBadData, ":" + std::to_string(number),
+      return fail(":" + std::to_string(number),
                   "'" + line + "' is not three numbers" + (facing ? " and a heading, which may be empty" : ""));
     route.push_back(*row);
   }
   const std::size_t most = has_headings(route) ? kMostWaypoints / 2 : kMostWaypoints;
   if (route.empty() || route.size() > most)
-    return fail(kBadData, "",
-                std::to_string(route.size()) + " points" + (has_headings(route) ? " with headings" : "") +
-                    ", expected 1 to " + std::to_string(most));
+    return fail("", std::to_string(route.size()) + " points" + (has_headings(route) ? " with headings" : "") +
+                        ", expected 1 to " + std::to_string(most));
   return route;
 }
 
@@ -80,4 +79,4 @@ std::vector<Vec3> waypoints_of(const std::vector<Waypoint>& route) {
   return points;
 }
 
-}  // namespace backwash::ctl
+}  // namespace backwash::config

@@ -5,19 +5,15 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "core/config/config.hpp"
 #include "core/types/waypoint.hpp"
 
-namespace backwash::ctl {
+namespace backwash::config {
 
-/// One line, FILE:LINE: what is wrong, and the exit code for it.
-struct RouteError {
-  int code;
-  std::string message;
-};
-
-/// Reads what `follow` flies (docs/interfaces.md, "Points CSV"). Errors: no file, another first line, a row that holds
-/// other than three finite numbers and where the file has headings one or none, more rows than a command holds.
-tl::expected<std::vector<Waypoint>, RouteError> read_route(const std::string& path);
+/// Reads what `backwashctl follow` flies (docs/interfaces.md, "Points CSV"). Errors (FILE:LINE: what is wrong): no
+/// file, another first line, a row that holds other than three finite numbers and where the file has headings one or
+/// none, more rows than a command holds.
+tl::expected<std::vector<Waypoint>, ConfigError> read_route(const std::string& path);
 
 /// Whether any row has a heading: the command then is FOLLOW_FACING, else FOLLOW.
 bool has_headings(const std::vector<Waypoint>& route);
@@ -26,4 +22,4 @@ bool has_headings(const std::vector<Waypoint>& route);
 /// faced from there, or the place again where the row has none (idl/backwash_msgs.idl).
 std::vector<Vec3> waypoints_of(const std::vector<Waypoint>& route);
 
-}  // namespace backwash::ctl
+}  // namespace backwash::config
