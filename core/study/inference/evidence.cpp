@@ -138,6 +138,10 @@ std::vector<Eigen::MatrixXd> Evidence::grams(const std::vector<const DesignColum
   const Eigen::Index z = trimmed ? 2 : 0;
   std::vector<Eigen::MatrixXd> grams(seen_->units.size(), Eigen::MatrixXd::Zero(z + p + 1, z + p + 1));
   for (std::size_t c = 0; c < kChannels; ++c) add_channel(grams, static_cast<Channel>(c), all);
+  for (std::size_t k = 0; k < columns.size(); ++k)  // what is known beforehand is known once, of all units together
+    for (auto& g : grams)
+      g(z + static_cast<Eigen::Index>(k), z + static_cast<Eigen::Index>(k)) +=
+          columns[k]->known / static_cast<double>(grams.size());
   if (!trimmed) return grams;
   for (auto& g : grams) {  // Woodbury: V⁻¹ less what the flight's own trim may explain
     const Eigen::Matrix2d own = g.topLeftCorner<2, 2>() + Eigen::Matrix2d::Identity() / tilt_;

@@ -34,8 +34,8 @@ struct LoopMotion {
   std::vector<Vec3> p, v, a;
 };
 /// The closed loop at each row, fed with the set-points and its own state, against a level drag, 1/s, without the
-/// loop's feedback delay. The end of each piece of kWindowRules.loop_step at most is held; after kWindowRules.restart
-/// it starts again where the vehicle is.
+/// loop's feedback delay. The middle of each piece of kWindowRules.loop_step at most is held; after
+/// kWindowRules.restart it starts again where the vehicle is.
 LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, double drag = 0);
 
 /// What the loop answers to the logged state at each row, by each attitude lag (s): r of docs/model.md 3-1, m/s². The
