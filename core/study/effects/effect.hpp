@@ -26,8 +26,6 @@ struct DesignColumn {
     bool aside = false;
   };
   std::vector<Part> parts;
-  /// Of a free column: one over the variance of its parameter beforehand; 0: nothing is known of it.
-  double known = 0;
 };
 
 using Windows = std::vector<WindowRow>;

@@ -109,10 +109,6 @@ std::vector<DesignColumn> offsets(const std::vector<DesignColumn>& columns, cons
           {c, values(ws, [&](auto& w) { return kEffectRules.noise_unit / w.sigma[static_cast<int>(c - kVarX)]; })});
     free.push_back(std::move(noise));
   }
-  if (used[kCommandDelayH] && seen.row_period > 0) {
-    free.push_back(in(kCommandDelayH, ws, [](auto& w) { return w.command_gain[0]; }));
-    free.back().known = 3 / std::pow(kWindowRules.command_age * seen.row_period, 2);  // any age within is alike
-  }
   return free;
 }
 

@@ -29,8 +29,10 @@ Form of_attitude() {
   return {.formula = "the attitude lags this much longer, level axes",
           .parameters = {"lag_s"},
           .priors = {{kPriors.typical_delay}},
+          .constant = true,
           .least = 0.01,
           .needs = {Source::setpoints},
+          .unknowable = [](const Observations& seen) { return seen.row_period / 4; },
           .columns =
               [](const Windows& ws, const Scale&) {
                 return std::vector{DesignColumn{{{kCommandDelayH, values(ws, [](auto& w) { return w.lag_gain[0]; })},

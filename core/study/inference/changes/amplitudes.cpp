@@ -22,10 +22,7 @@ Amplitudes::Amplitudes(const Evidence& evidence, const Form& form, const Scale& 
   size_ = evidence.size(columns_);
   std::vector<DesignColumn> all;
   if (!form.constant)
-    for (const auto& offset : offsets(columns_, evidence.seen())) {
-      all.push_back(decorrelated(offset));
-      known_.push_back(offset.known);
-    }
+    for (const auto& offset : offsets(columns_, evidence.seen())) all.push_back(decorrelated(offset));
   offsets_ = static_cast<Eigen::Index>(all.size());
   for (const auto& column : columns_) all.push_back(decorrelated(column));
   const auto m = static_cast<Eigen::Index>(all.size()) + 1;
@@ -60,8 +57,6 @@ std::optional<Amplitudes::Told> Amplitudes::solved(const Eigen::MatrixXd& gram) 
     const Eigen::MatrixXd cross = gram.topRightCorner(free, p + 1);
     Eigen::MatrixXd others = gram.topLeftCorner(free, free);  // one heading spans the body's axes
     others.diagonal().array() += kRules.ridge * (others.trace() + 1);
-    for (std::size_t k = 0; k < known_.size(); ++k)
-      others(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)) += known_[k];
     own -= cross.transpose() * others.ldlt().solve(cross);
   }
   for (Eigen::Index k = 0; k < p; ++k)

@@ -43,7 +43,6 @@ class Amplitudes {
   const Units* units_;
   std::vector<DesignColumn> columns_;
   Eigen::Index offsets_ = 0;
-  std::vector<double> known_;  // of the offsets (DesignColumn::known)
   Eigen::MatrixXd grams_;  // a window a column
   SmallMatrix size_;
 };
