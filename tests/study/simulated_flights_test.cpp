@@ -80,8 +80,8 @@ TEST(LoopOf, RowsIsAsLateAsTheSimulationOfHeldSetpoints) {
       v.push_back(quad.state().v_W);
       a.push_back(quad.acceleration());
       const auto [value, first, second] = minimum_jerk(std::min(1.0, quad.time() / seconds));
-      commands.push_back({Vec3(way * value, 0, 0), Vec3(way * first / seconds, 0, 0),
-                          Vec3(way * second / (seconds * seconds), 0, 0)});
+      commands.push_back(
+          {Vec3(way * value, 0, 0), Vec3(way * first / seconds, 0, 0), Vec3(way * second / (seconds * seconds), 0, 0)});
       quad.command(commands.back());
       for (int k = 0; k < held; ++k) quad.step(Vec3::Zero(), quad.state());
     }

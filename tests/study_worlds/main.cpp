@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// study_worlds --out DIR [--seed N] [--cause NAME]… [--size S] [--flights N] [--confound yaw|battery|fast] [--rough-walls F]
+// study_worlds --out DIR [--seed N] [--cause NAME]… [--size S] [--flights N] [--confound NAME] [--rough-walls F]
 // [--truth FILE]
 #include <chrono>
 #include <cstdio>

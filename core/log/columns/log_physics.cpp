@@ -198,7 +198,8 @@ Doubts of_attitude(const FlightLog& log) {
   std::size_t bad = 0;
   std::vector<double> squares(log.t_s.size(), 0);
   for (const char* name : kQ)
-    std::ranges::transform(log.column(name), squares, squares.begin(), [](double q, double sum) { return sum + q * q; });
+    std::ranges::transform(log.column(name), squares, squares.begin(),
+                           [](double q, double sum) { return sum + q * q; });
   for (const double square : squares) {
     bad += std::sqrt(square) < kLength[0] || std::sqrt(square) > kLength[1] ? 1u : 0u;
   }

@@ -77,8 +77,7 @@ void read_commands(Series& s, std::span<const Setpoint> commands, const Vehicle&
   lagging.attitude_lag += kWindowRules.more_lag;
   s.a_lagging = loop_of(flown, lagging).a;
   LoopMotion dragged = loop_of(flown, loop, kWindowRules.loop_drag);
-  for (std::size_t i = 0; i < s.size(); ++i)
-    dragged.a[i].head<2>() -= kWindowRules.loop_drag * dragged.v[i].head<2>();
+  for (std::size_t i = 0; i < s.size(); ++i) dragged.a[i].head<2>() -= kWindowRules.loop_drag * dragged.v[i].head<2>();
   s.v_dragged = std::move(dragged.v);
   s.a_dragged = std::move(dragged.a);
   if (s.simulated_by_thrust) {

@@ -13,7 +13,8 @@ struct Residual {
   std::array<std::vector<double>, 3> x;
   Vec3 sigma;
   bool comparable = true;  ///< else the vehicle's own manoeuvres are in it: measured, and not used
-  std::vector<double> share = {};  ///< of each sample: Σ where it was flown over the window's; empty: the same all along
+  std::vector<double> share =
+      {};  ///< of each sample: Σ where it was flown over the window's; empty: the same all along
 };
 
 /// What a flight's residuals are made of, pooled over its windows (each over its modelled variance).
