@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// study_worlds --out DIR [--seed N] [--cause NAME]… [--size S] [--flights N] [--confound yaw|battery] [--rough-walls F]
+// study_worlds --out DIR [--seed N] [--cause NAME]… [--size S] [--flights N] [--confound NAME] [--rough-walls F]
 // [--truth FILE]
 #include <chrono>
 #include <cstdio>
@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
   app.add_option("--size", request.size, "in units of the effect-size table").capture_default_str();
   app.add_option("--flights", request.flights).capture_default_str();
   app.add_option("--rough-walls", request.rough_walls, "factor on the variance near walls").capture_default_str();
-  app.add_option("--confound", request.confound).check(backwash::services::one_of({"yaw", "battery"}));
+  app.add_option("--confound", request.confound).check(backwash::services::one_of({"yaw", "battery", "fast"}));
   app.add_option("--truth", truth, "file for the answer");
   if (const auto code = app.parse(argc, argv)) return *code;
   const auto world = study_worlds::draw_world(request);

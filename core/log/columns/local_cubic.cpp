@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 
 namespace backwash::log {
 namespace {
@@ -13,15 +14,19 @@ constexpr std::size_t kLeastRows = 6;
 /// Through the rows [first, last) around time `at`.
 LocalMotion cubic(const std::vector<double>& t, const std::vector<Vec3>& p, std::size_t first, std::size_t last,
                   double at) {
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
-  Eigen::Matrix<double, 4, 3> right = Eigen::Matrix<double, 4, 3>::Zero();
+  std::array<double, 7> sum{};  // of powers of u: the normal equations' entry (i, k) is that of u^(i + k)
+  Eigen::Matrix<double, 3, 4> right = Eigen::Matrix<double, 3, 4>::Zero();
   for (std::size_t i = first; i < last; ++i) {
+    double power = 1;
     const double u = (t[i] - at) / kHalfWidth;
-    const Eigen::Vector4d basis(1, u, u * u, u * u * u);
-    normal += basis * basis.transpose();
-    right += basis * p[i].transpose();
+    for (std::size_t k = 0; k < sum.size(); ++k, power *= u) {
+      sum[k] += power;
+      if (k < 4) right.col(static_cast<Eigen::Index>(k)) += power * p[i];
+    }
   }
-  const Eigen::Matrix<double, 4, 3> c = normal.ldlt().solve(right);
+  const Eigen::Matrix4d normal = Eigen::Matrix4d::NullaryExpr(
+      [&](Eigen::Index i, Eigen::Index k) { return sum[static_cast<std::size_t>(i + k)]; });
+  const Eigen::Matrix<double, 4, 3> c = normal.llt().solve(right.transpose());
   return {c.row(1) / kHalfWidth, 2 * c.row(2) / (kHalfWidth * kHalfWidth)};
 }
 

@@ -41,8 +41,8 @@ std::vector<std::string> list(const Columns& names) {
 
 Vectors rows_of(const FlightLog& log, const Names& names) {
   Vectors rows;
-  for (std::size_t i = 0; i < log.t_s.size(); ++i)
-    rows.emplace_back(log.column(names[0])[i], log.column(names[1])[i], log.column(names[2])[i]);
+  const auto &x = log.column(names[0]), &y = log.column(names[1]), &z = log.column(names[2]);
+  for (std::size_t i = 0; i < log.t_s.size(); ++i) rows.emplace_back(x[i], y[i], z[i]);
   return rows;
 }
 
@@ -67,13 +67,14 @@ Vectors integral(const std::vector<double>& t, const Vectors& rows) {
   return sums;
 }
 
+using Motion = std::vector<std::optional<LocalMotion>>;
+
 /// Derivatives of the positions, and what the rows themselves say, both through the same filter: local_cubics of the
 /// way that the rows lead.
 struct Both {
   Vectors derived, said;
 };
-Both both_of(const FlightLog& log, const Names& names, bool second) {
-  const auto motion = local_cubics_but_for_holds(log.t_s, rows_of(log, kP));
+Both both_of(const FlightLog& log, const Motion& motion, const Names& names, bool second) {
   Vectors way = integral(log.t_s, rows_of(log, names));
   if (second) way = integral(log.t_s, way);
   const auto said = local_cubics(log.t_s, way);
@@ -96,8 +97,9 @@ double rms(const Vectors& rows, int axis) {
 /// Directions of the body's z axis, times gravity: what a thrust of the weight along it accelerates sideways.
 Vectors tilts(const FlightLog& log) {
   Vectors rows;
+  const auto &qw = log.column("qw"), &qx = log.column("qx"), &qy = log.column("qy"), &qz = log.column("qz");
   for (std::size_t i = 0; i < log.t_s.size(); ++i) {
-    const double w = log.column("qw")[i], x = log.column("qx")[i], y = log.column("qy")[i], z = log.column("qz")[i];
+    const double w = qw[i], x = qx[i], y = qy[i], z = qz[i];
     rows.push_back(kGravity * Vec3(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)));
   }
   return rows;
@@ -106,8 +108,8 @@ Vectors tilts(const FlightLog& log) {
 using Doubts = std::vector<ColumnDoubt>;
 void add(Doubts& doubts, Doubts more) { std::ranges::move(more, std::back_inserter(doubts)); }
 
-Doubts of_motion(const FlightLog& log, const Names& names, bool second) {
-  const auto both = both_of(log, names, second);
+Doubts of_motion(const FlightLog& log, const Motion& motion, const Names& names, bool second) {
+  const auto both = both_of(log, motion, names, second);
   return doubts_of({list(names), list(kP), second ? "the second derivative" : "the derivative",
                     second ? kLeastAcceleration : kLeastSpeed, nearest_unit(names[0], kP[0]), true},
                    both.said, both.derived);
@@ -165,8 +167,8 @@ bool silent(const FlightLog& log, std::span<const char* const> names) {
 }
 
 /// Velocities or accelerations that are 0 while the positions move.
-Doubts of_zeros(const FlightLog& log, const Names& names, bool second) {
-  const auto both = both_of(log, names, second);
+Doubts of_zeros(const FlightLog& log, const Motion& motion, const Names& names, bool second) {
+  const auto both = both_of(log, motion, names, second);
   for (int axis = 0; axis < 3 && !both.derived.empty(); ++axis)
     if (rms(both.derived, axis) > 2 * (second ? kLeastAcceleration : kLeastSpeed))
       return {{list(names), std::string(names[0]) + ", " + names[1] + " and " + names[2] +
@@ -194,9 +196,11 @@ std::optional<double> tilts_along(const FlightLog& log) {
 /// An attitude of no length, or whose parts stand in another order.
 Doubts of_attitude(const FlightLog& log) {
   std::size_t bad = 0;
-  for (std::size_t i = 0; i < log.t_s.size(); ++i) {
-    double square = 0;
-    for (const char* name : kQ) square += std::pow(log.column(name)[i], 2);
+  std::vector<double> squares(log.t_s.size(), 0);
+  for (const char* name : kQ)
+    std::ranges::transform(log.column(name), squares, squares.begin(),
+                           [](double q, double sum) { return sum + q * q; });
+  for (const double square : squares) {
     bad += std::sqrt(square) < kLength[0] || std::sqrt(square) > kLength[1] ? 1u : 0u;
   }
   if (bad > 0)
@@ -220,10 +224,11 @@ Doubts of_attitude(const FlightLog& log) {
 
 Doubts contradictions(const FlightLog& log) {
   Doubts doubts;
+  const auto motion = local_cubics_but_for_holds(log.t_s, rows_of(log, kP));
   for (const bool second : {false, true}) {
     const Names& names = second ? kA : kV;
     if (!has_all(log, names)) continue;
-    add(doubts, silent(log, names) ? of_zeros(log, names, second) : of_motion(log, names, second));
+    add(doubts, silent(log, names) ? of_zeros(log, motion, names, second) : of_motion(log, motion, names, second));
   }
   if (has_all(log, kA)) add(doubts, of_gravity(log));
   if (has_all(log, kQ)) add(doubts, of_attitude(log));

@@ -43,6 +43,7 @@ Observations drawn_windows() {
       for (double& x : *all) x = draw();
     for (auto* pair : {&w.delay_gain, &w.slope_gain, &w.mean_gain, &w.command_gain, &w.lag_gain})
       *pair = {draw(), -draw()};
+    w.drag_gain = draw();
     w.tilt_gain = draw();
     w.R_WB = Eigen::AngleAxisd(4 * draw(), Vec3::UnitZ()).toRotationMatrix();
     w.thrust_acc = kGravity * draw();

@@ -22,6 +22,7 @@ Windows flown(const WindowRow& median, const Manoeuvre* manoeuvre) {
     w.slope_gain = {};
     w.command_gain = {};
     w.lag_gain = {};
+    w.drag_gain = 0;
     w.mean_gain = {};
     w.tilt_gain = 0;
     if (manoeuvre) manoeuvre->set(w, (static_cast<double>(i) + 0.5) / kWindows);

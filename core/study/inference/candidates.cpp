@@ -197,12 +197,12 @@ void NullMaxima::add(const SearchCandidate& candidate) {
   const Eigen::LLT<SmallMatrix> bounded(total);
   const Eigen::LDLT<SmallMatrix> whole(normal.total);
   const Eigen::MatrixXd all = sums(normal);
+  Eigen::RowVectorXd most = Eigen::RowVectorXd::Constant(all.cols(), HUGE_VAL);
+  if (bounded.info() == Eigen::Success)
+    most = 0.5 * (1 + kRules.bound_error) * Eigen::MatrixXd(bounded.matrixL().solve(all)).colwise().squaredNorm();
   for (std::size_t d = 0; d < draws_.size(); ++d) {
-    const SmallVector sum = all.col(static_cast<Eigen::Index>(d));
-    if (bounded.info() == Eigen::Success &&
-        0.5 * (1 + kRules.bound_error) * SmallVector(bounded.matrixL().solve(sum)).squaredNorm() <= maxima_[d])
-      continue;
-    if (!may_be_effect(candidate, whole.solve(sum))) continue;
+    const auto column = static_cast<Eigen::Index>(d);
+    if (most[column] <= maxima_[d] || !may_be_effect(candidate, whole.solve(SmallVector(all.col(column))))) continue;
     const double held_out = normal.gain(draws_[d]);
     if (!(held_out > maxima_[d])) continue;
     const SmallVector fit = normal.fit(draws_[d]);

@@ -156,16 +156,16 @@ void refine_offset(const Evidence& evidence, Accepted& cause, const std::vector<
                       {"y_m", best[1], best[1] - error[1], best[1] + error[1]}};
 }
 
-/// Takes the parts that speak of variances out of a column, and returns them: what a push adds to a window's variance
-/// goes by its course along the window, which is known less well than its mean, and has a factor of its own in a size.
-/// Of a column that speaks of variances alone nothing is taken.
-DesignColumn without_variances(DesignColumn& column) {
+/// Takes the parts that speak of variances or of the commands' delay out of a column, and returns them: what a push
+/// adds to a window's variance, or makes of the loop's answer, goes by its course along the window, which is known less
+/// well than its mean, and has a factor of its own in a size. Of a column that speaks of no mean nothing is taken.
+DesignColumn without_course(DesignColumn& column) {
   DesignColumn taken;
   if (column.parts.front().channel > kMeanZ) return taken;
   std::erase_if(column.parts, [&](auto& part) {
-    const bool variance = std::find(kVariances.begin(), kVariances.end(), part.channel) != kVariances.end();
-    if (variance) taken.parts.push_back(part);
-    return variance;
+    const bool course = part.channel == kCommandDelayH || std::ranges::count(kVariances, part.channel) > 0;
+    if (course) taken.parts.push_back(part);
+    return course;
   });
   return taken;
 }
@@ -183,7 +183,7 @@ struct Family {
   NormalEquations normal_at(const Form& shape, const Scale& at) const {
     auto columns = shape.columns(windows, at);
     auto nuisance = shape.constant ? std::vector<DesignColumn>{} : offsets(columns, evidence.seen(), others);
-    if (shapes[0].by_size) nuisance.push_back(without_variances(columns[0]));
+    if (shapes[0].by_size) nuisance.push_back(without_course(columns[0]));
     const auto open = companions(shapes[0], evidence.seen());
     nuisance.insert(nuisance.end(), open.begin(), open.end());
     nuisance.insert(nuisance.end(), others.begin(), others.end());

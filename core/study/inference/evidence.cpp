@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/study/effects/columns.hpp"
 #include "core/study/inference/rules.hpp"
 #include "core/study/windows/signals/signals.hpp"
 
@@ -72,6 +73,7 @@ Evidence Evidence::next(const Observations& flight) const {
   Evidence one(flight);
   one.scatter_ = scatter_;
   one.tilt_ = tilt_;
+  one.set_age(age_);
   for (const auto& part : one.y_.parts)
     if (part.channel == kVarX) one.weigh_means(part.x);
   return one;
@@ -269,9 +271,25 @@ DesignColumn Evidence::residual(const std::vector<DesignColumn>& fitted) const {
   return residual;
 }
 
+void Evidence::set_age(double age) {
+  for (auto& part : y_.parts)
+    for (std::size_t i = 0; i < part.x.size() && part.channel == kCommandDelayH; ++i)
+      part.x[i] -= (age - age_) * seen_->windows[i].command_gain[0];
+  age_ = age;
+}
+
+/// Beside what is accepted; 0 where that spans every delay.
+double Evidence::likeliest_age(const std::vector<DesignColumn>& accepted) const {
+  const double most = kWindowRules.command_age * seen_->row_period;
+  const auto delay = in(kCommandDelayH, seen_->windows, [](auto& w) { return w.command_gain[0]; });
+  const NormalEquations alone = normal({delay}, accepted);
+  return alone.excited ? std::clamp(age_ + alone.fit()[0], -most, most) : 0;
+}
+
 void Evidence::whiten(const std::vector<DesignColumn>& accepted) {
   scatter_.fill({1, 0, 0});
   tilt_ = 0;
+  set_age(likeliest_age(accepted));
   std::vector<DesignColumn> columns = offsets(accepted, *seen_);
   columns.insert(columns.end(), accepted.begin(), accepted.end());
   const DesignColumn rest = residual(columns);

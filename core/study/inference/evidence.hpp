@@ -28,7 +28,8 @@ class Evidence {
 
   /// Leaves columns free in all that follows, as if they were accepted each time.
   void leave_free(std::vector<DesignColumn> columns) { free_ = std::move(columns); }
-  /// Takes the accepted columns (with the offsets of their channels) out and estimates the scatter of what is left.
+  /// Takes the accepted columns (with the offsets of their channels) out and estimates the scatter of what is left, and
+  /// how much older than assumed the set-points act, within what no log tells (docs/model.md 8-2b).
   void whiten(const std::vector<DesignColumn>& accepted);
 
   /// ln likelihood of each unit under the scatter of the last whiten(), `columns` and the offsets of every
@@ -62,6 +63,8 @@ class Evidence {
   void add_channel(std::vector<Eigen::MatrixXd>& grams, Channel c, const std::vector<DesignColumn>& columns) const;
   void weigh_means(const std::vector<double>& ln_variance);
   double trim_scatter(const DesignColumn& residual) const;
+  void set_age(double age);
+  double likeliest_age(const std::vector<DesignColumn>& accepted) const;
 
   const Observations* seen_;
   DesignColumn y_;  // every channel, decorrelated
@@ -71,6 +74,7 @@ class Evidence {
   std::vector<std::size_t> flight_end_;  // per window, where its flight ends
   std::array<Scatter, kChannels> scatter_{};
   double tilt_ = 0;  // σ_t²
+  double age_ = 0;   // s, of the set-points, beyond the assumed one: taken out of y_
 };
 
 }  // namespace backwash::study

@@ -82,10 +82,16 @@ LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, double drag
     const bool gap = dt > 2 * kWindowRules.held;
     if (gap) now = {log.p[i], log.v[i]};
     for (int k = 0; k < pieces(dt); ++k) {
-      const double h = gap ? 0 : dt / pieces(dt), t = log.t[i] - dt + (k + 1) * h;
-      a = loop.after(a, loop.asked(place.at(t - loop.latency).command(), now), h);
-      now.v_W += h * (a - drag * Vec3(now.v_W.x(), now.v_W.y(), 0));
-      now.p_W += h * now.v_W;
+      const double h = gap ? 0 : dt / pieces(dt), middle = log.t[i] - dt + (k + 0.5) * h;
+      const auto rate = [&](const Vec3& by_rotors, const Vec3& v) -> Vec3 {
+        return by_rotors - drag * Vec3(v.x(), v.y(), 0);
+      };
+      const Vec3 v = now.v_W + h / 2 * rate(a, now.v_W);
+      const Vec3 u = loop.asked(place.at(middle - loop.latency).command(), {now.p_W + h / 2 * now.v_W, v});
+      const Vec3 before = loop.attitude_lag > 0 ? a : u;
+      a = loop.after(a, u, h);
+      now.p_W += h * v;
+      now.v_W += h * rate((before + a) / 2, v);
     }
     out.p.push_back(now.p_W);
     out.v.push_back(now.v_W);

@@ -34,7 +34,7 @@ struct LoopMotion {
   std::vector<Vec3> p, v, a;
 };
 /// The closed loop at each row, fed with the set-points and its own state, against a level drag, 1/s, without the
-/// loop's feedback delay. The end of each piece of kWindowRules.loop_step at most is held; after twice
+/// loop's feedback delay. The middle of each piece of kWindowRules.loop_step at most is held; after twice
 /// kWindowRules.held it starts again where the vehicle is.
 LoopMotion loop_of(const Flown& log, const loop::PositionLoop& loop, double drag = 0);
 

@@ -114,6 +114,7 @@ struct WindowRow {
   std::array<double, kPoints> climbs{};   ///< m/s, v_z along the window
   std::array<double, 2> command_gain{};   ///< design of kCommandDelayH, kCommandDelayZ
   std::array<double, 2> lag_gain{};       ///< the same of a longer lag of the attitude
+  double drag_gain = 0;                   ///< and of a level drag, in kCommandDelayH: the loop is earlier against it
   double tilt_gain = 0;                   ///< design of kTiltDelay
   Vec3 measured_variance = Vec3::Zero();  ///< (m/s²)²
   std::array<std::optional<RotorLine>, 4>

@@ -123,10 +123,11 @@ struct Visitor {
   void visit(WindowRow& row) {
     auto& [flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, thrust_acc, voltage, temperature,
            around, path, led, held_off, varied2, sigma, ln_sigma_moved, delay_gain, slope_gain, mean_gain, delay_at,
-           slope_at, climbs, command_gain, lag_gain, tilt_gain, measured_variance, lines] = row;
+           slope_at, climbs, command_gain, lag_gain, drag_gain, tilt_gain, measured_variance, lines] = row;
     (*this)(flight, segment, t, duration, p_W, v_W, speed, speeds, shares, R_WB, thrust_acc, voltage);
     (*this)(temperature, around, path, led, held_off, varied2, sigma, ln_sigma_moved, delay_gain);
-    (*this)(slope_gain, mean_gain, delay_at, slope_at, climbs, command_gain, lag_gain, tilt_gain, measured_variance);
+    (*this)(slope_gain, mean_gain, delay_at, slope_at, climbs, command_gain, lag_gain, drag_gain, tilt_gain);
+    visit(measured_variance);
     visit(lines);
   }
   void visit(Observations& seen) {

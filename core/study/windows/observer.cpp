@@ -22,6 +22,18 @@ double gusts_at(double folded, double dt, double tau) {
   return (1 - a * a) / (1 + a * a - 2 * a * std::cos(2 * std::numbers::pi * folded));
 }
 
+/// Σ at each sample over the window's, by lines between the points at which it is known.
+std::vector<double> shares_of_samples(const WindowRow& row, SampleRange w) {
+  std::vector<double> all(w.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const double q = (static_cast<double>(i) + 0.5) / static_cast<double>(all.size()) * kPoints - 0.5,
+                 at = std::clamp(q, 0.0, kPoints - 1.0);
+    const std::size_t k = std::min(static_cast<std::size_t>(at), kPoints - 2);
+    all[i] = kPoints * (row.shares[k] + (at - static_cast<double>(k)) * (row.shares[k + 1] - row.shares[k]));
+  }
+  return all;
+}
+
 }  // namespace
 
 Observer::Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid)
@@ -96,7 +108,7 @@ void Observer::put(const ChannelValue& measured) {
 /// Means; returns the detrended residuals.
 Residual Observer::put_means(const WindowRow& row, const Series& s, SampleRange w) {
   // What differentiation makes of the noise of positions or velocities is no gust, and its share follows Σ.
-  Residual rest{{}, row.sigma, s.has_acceleration && (simulated(s) || !under_way(s, w))};
+  Residual rest{{}, row.sigma, s.has_acceleration && (simulated(s) || !under_way(s, w)), shares_of_samples(row, w)};
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     const auto residual = [&](std::size_t i) { return s.a[i][axis] - s.a_sim[i][axis]; };

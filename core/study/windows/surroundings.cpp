@@ -18,6 +18,7 @@ MapView::MapView(const map::OccupancyGrid* grid, const Model& model)
   const Vec3 extent = grid_->resolution() * grid_->size().cast<double>();
   size_ = (extent / kWindowRules.sigma_lattice).array().ceil().cast<int>() + 2;
   lattice_.resize(static_cast<std::size_t>(size_.prod()));
+  lattice_solid_.resize(lattice_.size());
 }
 
 bool MapView::near(const Vec3& p_W) const {
@@ -55,6 +56,18 @@ const Vec3& MapView::lattice_ln_sigma(const Index3& at) {
   return *stored;
 }
 
+bool MapView::lattice_in_solid(const Index3& at) {
+  auto& stored = lattice_solid_[map::linear(size_, at)];
+  if (stored) return *stored;
+  stored = false;
+  for (int n = 0; n < 8; ++n) {
+    const Vec3 aside(n & 1 ? 1 : -1, n & 2 ? 1 : -1, n & 4 ? 1 : -1);
+    const Vec3 beside = at.cast<double>() + kWindowRules.corner_least * aside;
+    stored = *stored || inside_solid(low_ + kWindowRules.sigma_lattice * beside);
+  }
+  return *stored;
+}
+
 Vec3 MapView::sigma(const Vec3& p_W) {
   if (!field_) return base_;
   const auto exactly = [this](const Vec3& at_W) -> Vec3 {
@@ -66,22 +79,12 @@ Vec3 MapView::sigma(const Vec3& p_W) {
   if ((corner.array() < 0).any() || ((corner + Index3::Ones()).array() >= size_.array()).any()) {
     return exactly(p_W);
   }
-  // A corner within a solid, or on its face, says nothing of the air beside it.
-  const auto in_solid = [&](const Index3& v) {
-    for (const double x : {-1, 1})
-      for (const double y : {-1, 1})
-        for (const double z : {-1, 1}) {
-          const Vec3 beside = v.cast<double>() + kWindowRules.corner_least * Vec3(x, y, z);
-          if (inside_solid(low_ + kWindowRules.sigma_lattice * beside)) return true;
-        }
-    return false;
-  };
   Vec3 ln = Vec3::Zero();
   double free = 0;
   const bool buried = inside_solid(p_W);
   map::for_corners(q, [&](const Index3& v, const Vec3& share) {
     if (!(share.prod() > kWindowRules.corner_least)) return;
-    if (!buried && in_solid(v)) return;
+    if (!buried && lattice_in_solid(v)) return;
     ln += share.prod() * lattice_ln_sigma(v);
     free += share.prod();
   });

@@ -34,6 +34,8 @@ class MapView {
  private:
   bool whole(const Vec3& p_W, const Around& around, const std::pair<double, Vec3>& wall) const;
   const Vec3& lattice_ln_sigma(const Index3& at);
+  /// Whether a lattice point is within a solid, or on its face: it says nothing of the air beside it.
+  bool lattice_in_solid(const Index3& at);
 
   const map::OccupancyGrid* grid_;
   Vec3 base_;
@@ -42,6 +44,7 @@ class MapView {
   Vec3 low_;
   Index3 size_;
   std::vector<std::optional<Vec3>> lattice_;
+  std::vector<std::optional<bool>> lattice_solid_;
 };
 
 }  // namespace backwash::study

@@ -110,6 +110,23 @@ double tail_of(const std::vector<Residual>& windows) {
   return mean;
 }
 
+// A climb leads through air of which Σ is ten times as large below as above: no burst.
+TEST(Tails, OfAirThatChangesAlongAWindowAreThoseOfItsModelledCourse) {
+  auto windows = made(600, false, 0, 23);
+  double squares = 0;
+  std::vector<double> course;
+  for (int i = 0; i < 100; ++i) course.push_back(std::pow(10, i / 99.0));
+  for (const double x : course) squares += x / 100;
+  for (auto& w : windows) {
+    for (auto& x : w.x)
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] *= std::sqrt(course[i] / squares);
+  }
+  EXPECT_GT(tail_of(windows), 0.15);  // what is called bursts, of windows whose Σ is one number
+  for (auto& w : windows)
+    for (const double x : course) w.share.push_back(x / squares);
+  EXPECT_LT(std::abs(tail_of(windows)), 0.05);
+}
+
 // Rotors of one rate have one line: each window's is the value of one of them, in turn. 2 Hz apart each has its own.
 TEST(RotorValues, OneLineOfSeveralRotorsCountsOnce) {
   for (const double apart : {0.0, 2.0}) {

@@ -23,6 +23,8 @@ std::vector<DesignColumn> against(const Windows& ws, const Scale& scale, F per_s
     }
     return -v * (way > 0 ? dragged / way : per_speed(speed));
   });
+  // The loop meets a drag by its feedback, and is earlier against it: no delay of the set-points.
+  column.parts.push_back({kCommandDelayH, values(ws, [](auto& w) { return w.drag_gain; }), true});
   for (std::size_t a = 0; a < 2 && k > 0; ++a)
     column.parts.push_back({kVariances[a], values(ws, [&](auto& w) {
                               const auto axis = static_cast<Eigen::Index>(a);

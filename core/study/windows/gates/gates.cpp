@@ -93,8 +93,9 @@ double LogGates::share_of(double u) const { return vehicle_ ? thrust_share(*vehi
 std::optional<double> LogGates::hover_thrust() const {
   std::vector<double> shares;
   double sum = 0, squares = 0;
+  const auto& thrust = log_.column("thrust");
   for (const auto row : rows_) {
-    shares.push_back(share_of(log_.column("thrust")[row]));
+    shares.push_back(share_of(thrust[row]));
     sum += shares.back();
     squares += shares.back() * shares.back();
   }

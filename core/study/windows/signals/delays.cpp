@@ -49,11 +49,12 @@ double asked_up(const Series& s, std::size_t i) {
   return asked_thrust(s, i) * f.z() / std::max(f.norm(), kWindowRules.no_attitude.value);
 }
 
-/// What a window says of a delay: its value, its design, and that of a longer lag of the attitude, each over √Σx².
+/// What a window says of a delay: its value, its design, and those of a longer lag of the attitude and of a drag, each
+/// over √Σx².
 struct Late {
   double y;
   DelayStage::PerSecond design;
-  double lagging = 0;
+  double lagging = 0, dragged = 0;
 };
 
 /// How late the attitude follows what the loop asks of it, in hover: there the loop answers gusts alone, by the
@@ -86,16 +87,20 @@ std::optional<Late> tilt_delay(const Series& s, SampleRange w) {
 
 /// How late set-points act, of axes `from` … `to` − 1, along the nominal rate of each.
 std::optional<Late> command_delay(const Series& s, SampleRange w, int from, int to) {
-  double y = 0, square = 0, lagging = 0;
+  double y = 0, square = 0, lagging = 0, dragged = 0;
   DelayStage::PerSecond design{};
   for (int axis = from; axis < to; ++axis) {
     const auto nominal = [&s, axis](std::size_t i) { return s.a_nominal[i][axis]; };
     const Moment m(rates(s, w, nominal));
     if (!m.excited(kWindowRules.excited_rate)) continue;
     const double norm = std::sqrt(m.square);
-    y -= norm * m.with(detrended_values(w, [&](std::size_t i) { return s.a[i][axis] - nominal(i); }));
+    const auto later_by = [&](const std::vector<Vec3>& a) {
+      return -norm * m.with(detrended_values(w, [&](std::size_t i) { return a[i][axis] - nominal(i); }));
+    };
+    y += later_by(s.a);
     square += m.square;
-    lagging -= norm * m.with(detrended_values(w, [&](std::size_t i) { return s.a_lagging[i][axis] - nominal(i); }));
+    lagging += later_by(s.a_lagging);
+    dragged += later_by(s.a_dragged);
     for (std::size_t k = 0; k < kShifts.size(); ++k) {
       const auto later = [&](std::size_t i) { return earlier(s, i, kShifts[k], axis) - nominal(i); };
       design[k] += kShifts[k] != 0 ? -norm * m.with(detrended_values(w, later)) / kShifts[k] : m.square;
@@ -103,7 +108,8 @@ std::optional<Late> command_delay(const Series& s, SampleRange w, int from, int 
   }
   if (!(square > 0)) return std::nullopt;
   for (double& d : design) d /= std::sqrt(square);
-  return Late{y / std::sqrt(square), design, lagging / kWindowRules.more_lag / std::sqrt(square)};
+  return Late{y / std::sqrt(square), design, lagging / kWindowRules.more_lag / std::sqrt(square),
+              dragged / kWindowRules.loop_drag / std::sqrt(square)};
 }
 
 }  // namespace
@@ -145,6 +151,7 @@ std::vector<ChannelValue> Delays::add(const Series& s, SampleRange w, std::size_
     if (const auto late = k == 0 ? command_delay(s, w, 0, 2) : command_delay(s, w, 2, 3)) {
       values.push_back({kCommandDelayH + k, late->y, 1});
       row.lag_gain[k] = late->lagging;
+      if (k == 0) row.drag_gain = late->dragged;
       command[k].add(number, late->y, late->design);
     }
   if (!s.simulated_by_thrust) return values;

@@ -9,17 +9,17 @@
 namespace backwash::study {
 
 std::vector<double> slow(const Series& s, SampleRange w, const std::vector<double>& z, double width) {
-  std::vector<double> out(z.size());
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    double sum = 0, weights = 0;
-    for (std::size_t k = 0; k < z.size(); ++k) {
+  std::vector<double> sum = z, weights(z.size(), 1);
+  for (std::size_t i = 0; i < z.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) {
       const double weight = bell(s, w.begin + i, w.begin + k, width);
-      sum += weight * z[k];
-      weights += weight;
+      sum[i] += weight * z[k];
+      sum[k] += weight * z[i];
+      weights[i] += weight;
+      weights[k] += weight;
     }
-    out[i] = sum / weights;
-  }
-  return detrended(out);
+  for (std::size_t i = 0; i < z.size(); ++i) sum[i] /= weights[i];
+  return detrended(sum);
 }
 
 void FirstStage::add(const std::array<std::vector<double>, 2>& z, const std::array<std::vector<double>, 2>& thrust) {

@@ -77,7 +77,10 @@ void read_commands(Series& s, std::span<const Setpoint> commands, const Vehicle&
   loop::PositionLoop lagging = loop;
   lagging.attitude_lag += kWindowRules.more_lag;
   s.a_lagging = loop_of(flown, lagging).a;
-  s.v_dragged = loop_of(flown, loop, kWindowRules.loop_drag).v;
+  LoopMotion dragged = loop_of(flown, loop, kWindowRules.loop_drag);
+  for (std::size_t i = 0; i < s.size(); ++i) dragged.a[i].head<2>() -= kWindowRules.loop_drag * dragged.v[i].head<2>();
+  s.v_dragged = std::move(dragged.v);
+  s.a_dragged = std::move(dragged.a);
   if (s.simulated_by_thrust) {
     std::array<double, kShifts.size()> lags;
     for (std::size_t n = 0; n < lags.size(); ++n) lags[n] = loop.attitude_lag + kShifts[n];

@@ -29,7 +29,7 @@ struct Series {
   std::vector<double> thrust_acc;  ///< T/m, m/s²; empty without thrust
   /// Closed loop fed with the set-points alone; empty without set-points.
   std::vector<Vec3> p_nominal, v_nominal, a_nominal;
-  std::vector<Vec3> v_dragged;  ///< of the same loop against a level drag of kWindowRules.loop_drag
+  std::vector<Vec3> v_dragged, a_dragged;  ///< of the same loop against a level drag of kWindowRules.loop_drag
   /// The same loop with an attitude that lags kWindowRules.more_lag longer.
   std::vector<Vec3> a_lagging;
   /// What the loop answers to the logged state and set-points, by an attitude lag that is kShifts longer; empty without

@@ -66,9 +66,10 @@ Fourth fourth_moments(const Residual& window, const Texture& t) {
     const double white = t.white[axis], unit = std::pow(t.scale * window.sigma[axis], 2);
     double fourth = 0;
     std::vector<double> square;
-    for (const double v : x) {
-      fourth += v * v * (v * v - 6 * white) + 3 * white * white;
-      square.push_back(v * v - white);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const double v2 = x[i] * x[i], share = window.share.empty() ? 1 : window.share[i];
+      fourth += (v2 * (v2 - 6 * white) + 3 * white * white) / (share * share);
+      square.push_back((v2 - white) / share);
     }
     sum.at_once += fourth / (3 * static_cast<double>(x.size()) * unit * 3);
     for (std::size_t k = 0; k < t.lags.size(); ++k)

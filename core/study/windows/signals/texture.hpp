@@ -13,6 +13,8 @@ struct Residual {
   std::array<std::vector<double>, 3> x;
   Vec3 sigma;
   bool comparable = true;  ///< else the vehicle's own manoeuvres are in it: measured, and not used
+  std::vector<double> share =
+      {};  ///< of each sample: Σ where it was flown over the window's; empty: the same all along
 };
 
 /// What a flight's residuals are made of, pooled over its windows (each over its modelled variance).
@@ -29,8 +31,8 @@ Texture texture_of(const std::vector<Residual>& windows, double rate_hz);
 
 /// A window's part of the kurtosis, both over the square of the flight's variance: a third of the mean of x⁴, and the
 /// mean of x_i² x_j² at the texture's lags over 1 + 2ρ². Both are the same for a Gaussian signal, unbiased however
-/// short the window is, as long as its variance is the same all along and bursts 0.3 s apart are independent. The white
-/// part is taken out of both.
+/// short the window is, as long as its variance goes as the modelled one along it and bursts 0.3 s apart are
+/// independent. The white part is taken out of both.
 struct Fourth {
   double at_once = 0, apart = 0;
 };
