@@ -60,7 +60,7 @@ struct Rules {
   Rule fewest_trimmed{"fewest_trimmed", 3, "flights", "derived: two parameters and a scatter"};
   Rule no_turn{"no_turn", 1e-9, "1", "derived: a determinant that rounding made"};
   // Normal equations
-  Rule most_columns{"most_columns", 16, "columns", "derived: many_cosines along both level axes"};
+  Rule most_columns{"most_columns", 16, "columns", "derived: eight cosines along both level axes"};
   Rule spanned{"spanned", 1e-4, "of a column's square", "chosen: what the nuisance explains up to 1 % has no say"};
   Rule least_square{"least_square", 1e-9, "1", "derived: a sum of squares that rounding made"};
   Rule left_out_share{"left_out_share", 0.02, "of a column's square",

@@ -60,11 +60,12 @@ bool MapView::lattice_in_solid(const Index3& at) {
   auto& stored = lattice_solid_[map::linear(size_, at)];
   if (stored) return *stored;
   stored = false;
-  for (int n = 0; n < 8; ++n) {
-    const Vec3 aside(n & 1 ? 1 : -1, n & 2 ? 1 : -1, n & 4 ? 1 : -1);
-    const Vec3 beside = at.cast<double>() + kWindowRules.corner_least * aside;
-    stored = *stored || inside_solid(low_ + kWindowRules.sigma_lattice * beside);
-  }
+  for (const int x : {-1, 1})
+    for (const int y : {-1, 1})
+      for (const int z : {-1, 1}) {
+        const Vec3 beside = at.cast<double>() + kWindowRules.corner_least * Vec3(x, y, z);
+        stored = *stored || inside_solid(low_ + kWindowRules.sigma_lattice * beside);
+      }
   return *stored;
 }
 
