@@ -64,7 +64,10 @@ assert changed["map_shares"][1]["outside"] > 0.1 and "parallel-walls-2m" in chan
 PYTHON
 status=0
 "$backwash" study two1.csv "${rooms[@]}" >log 2>stderr || status=$?
-[[ $status == 64 ]] && grep -q 'two1.csv follows none of the several --map' stderr || die "a log without its map: exit $status, $(cat stderr)"
+[[ $status == 64 ]] && grep -q 'two1.csv follows no --map, as others do' stderr || die "a log without its map: exit $status, $(cat stderr)"
+status=0
+"$backwash" study --log two1.csv --map builtin:parallel-walls-4m --log four1.csv four2.csv --vehicle $quad --quick >log 2>stderr || status=$?
+[[ $status == 64 ]] && grep -q 'two1.csv follows no --map, as others do' stderr || die "a log before the only map: exit $status, $(cat stderr)"
 # Logs without a map: a page of a flat floor.
 "$backwash" calibrate --log poor1.csv poor2.csv two1.csv --vehicle $quad --keep-base --bootstraps 20 --report flat.html >log 2>stderr || die "without a map: $(cat stderr)"
 

@@ -35,10 +35,10 @@ study::WindowOptions mapless_windows(const Model& gates) {
 }
 
 std::size_t place_of(const CampaignFiles& files, const CampaignFiles::Log& log) {
-  if (files.maps.size() <= 1) return 0;
-  if (!log.map)
-    throw Failure(kUsage, log.path + " follows none of the several --map; give it after its own, with --log");
-  return *log.map;
+  if (log.map) return *log.map;
+  if (files.maps.size() > 1 || std::ranges::any_of(files.logs, [](auto& other) { return other.map.has_value(); }))
+    throw Failure(kUsage, log.path + " follows no --map, as others do; give it after its own, with --log");
+  return 0;
 }
 
 }  // namespace

@@ -284,7 +284,9 @@ Verb study_verb(Command& app) {
       "--out extended.toml");
   return {&command, [options] {
             keep_pages();
-            for (const auto& log : options->logs) options->files.logs.push_back({log, std::nullopt});
+            for (const auto& log : options->logs)
+              options->files.logs.push_back(
+                  {log, options->files.maps.size() == 1 ? std::optional<std::size_t>(0) : std::nullopt});
             return run(*options);
           }};
 }

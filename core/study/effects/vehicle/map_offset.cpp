@@ -12,7 +12,7 @@ namespace {
 std::vector<Scale> tried_offsets() {
   std::vector<Scale> offsets;
   constexpr double kTurn = 2 * std::numbers::pi / kEffectRules.offset_directions;
-  for (const double length : {1 * kEffectRules.offset_near, 2 * kEffectRules.offset_near})
+  for (const double length : {kEffectRules.offset_near.value, 2 * kEffectRules.offset_near})
     for (int k = 0; k < kEffectRules.offset_directions; ++k)
       offsets.push_back({0, whole_millimetres(length * Vec3(std::cos(kTurn * k), std::sin(kTurn * k), 0))});
   return offsets;
