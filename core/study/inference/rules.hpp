@@ -50,7 +50,7 @@ struct Rules {
   // Scatter
   Rule motor_scatter{"motor_scatter", 0.01, "1",
                      "chosen: so well do reference flights tell a rotor's share (docs/measurements/recordings.md); "
-                     "craft differ by rotor_spread"};
+                     "craft differ by built_scatter"};
   Rule dropout_scatter{"dropout_scatter", 0.003, "1", "chosen: of readings, lost by a sound sensor"};
   Rule least_scatter{"least_scatter", 1e-8, "channel²", "derived: so that an exact channel can be divided by"};
   Rule least_rotor_scatter{"least_rotor_scatter", 1e-6, "1",
@@ -99,7 +99,6 @@ struct Rules {
   Rule rotor_level{"rotor_level", 0.05, "1", "chosen: over the four rotors"};
   Rule rotor_of_interest{"rotor_of_interest", 0.06, "of one rotor's thrust",
                          "derived: the size of docs/measurements/confusion.md"};
-  Rule normal_80{"normal_80", normal::k80, "1", "derived: quantile of the normal distribution at `power`"};
   Rule fewest_sound{"fewest_sound", 4, "flights", "derived: three contrasts and a scatter"};
   // Causes in some flights only
   Rule fewest_divided{"fewest_divided", 6, "flights", "derived: two levels and a scatter about each"};
