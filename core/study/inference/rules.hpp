@@ -72,7 +72,8 @@ struct Rules {
   Rule normal_975{"normal_975", normal::k975, "1", "derived: its quantile of the normal distribution"};
   Rule fine_scales{"fine_scales", 12, "scales", "chosen: the likelihood is averaged over so many"};
   Rule beyond_scales{"beyond_scales", 1.5, "1", "chosen: the finer grid goes so far beyond the searched scales"};
-  Rule rounds{"rounds", 2, "rounds", "chosen: of the likeliest shape and where it pushes the craft"};
+  Rule rounds{"rounds", 2, "rounds",
+              "chosen: of the likeliest shape and where it pushes the craft; of a fit and its scatter"};
   Rule turns{
       "turns", 4, "turns",
       "derived: each leaves the push's slope over k_p of the error: 0.15 at 0.3 m/s² over 0.2 m, 5e-4 after four"};
