@@ -108,7 +108,8 @@ TEST_F(ImportColumns, ATableInNedWithBodyForcesInGAndStampsInMicrosecondsIsTheFl
     return cells += std::llround(t * 100) % 10 == 0 ? ",4012" : ",";  // ten times as rare
   });
   ColumnMap map;
-  map.ned = map.frd = true;
+  map.world = turn_of("y, x, -z");
+  map.body = turn_of("x, -y, -z");
   map.columns = {{"t_s", {"stamp", "us"}},
                  {"x_m", {"n", "mm"}},
                  {"y_m", {"e", "mm"}},
@@ -226,7 +227,7 @@ TEST_F(ImportColumns, TablesThatAreNoFlightAreRefusedAndCrashNothing) {
   table("t,x,y,z", [](double) { return std::string("nan,0,0,0"); });
   EXPECT_NE(refusal(map).find("fewer than 100 rows"), std::string::npos) << refusal(map);
   table("t,x,y,z", [](double) { return std::string(); });
-  EXPECT_NE(refusal(map).find("fewer than 100 rows"), std::string::npos) << refusal(map);
+  EXPECT_NE(refusal(map).find("no rows of numbers"), std::string::npos) << refusal(map);
   table("t,x,y,z", [](double t) { return line({5 * t, std::sin(t), 0, 1}); });  // 20 Hz
   EXPECT_NE(refusal(map).find("too few rows around each position"), std::string::npos) << refusal(map);
   map.columns["y_m"].name = "t";
@@ -239,7 +240,7 @@ TEST_F(ImportColumns, HeightsOfANedTableAreTurnedToo) {
     return line({t, p.x(), p.y(), p.z(), 1.5});
   });
   ColumnMap map;
-  map.ned = true;
+  map.world = turn_of("y, x, -z");
   map.columns = {
       {"t_s", {"t", ""}}, {"x_m", {"x", ""}}, {"y_m", {"y", ""}}, {"z_m", {"z", ""}}, {"surface_z_m", {"floor", ""}}};
   const auto log = import_columns(path_, map);

@@ -14,9 +14,7 @@ namespace {
 
 constexpr std::size_t kParts = 10;  // of a flight, left out in turn
 constexpr double kErrors = 3.25;    // Student's t at 99 %, two-sided, of kParts
-constexpr double kFollows = 0.7;    // correlation: half of the variance is the other's
 constexpr double kClearly = 0.05;   // by which one correlation is more than another
-constexpr double kStranger = 0.3;   // below it two that moved have nothing to do with each other
 constexpr double kEverything = std::numeric_limits<double>::infinity();
 
 struct Moments {

@@ -11,6 +11,9 @@
 
 namespace backwash::log {
 
+/// Correlation from which one quantity follows another, half of its variance, and below which they are strangers.
+inline constexpr double kFollows = 0.7, kStranger = 0.3;
+
 /// How a quantity y goes with another, x, when both are measured with errors (docs/model.md, 3-9): y = sign·g·x, g
 /// within [low, high]. Frisch's bounds (1934), each moved outwards by its sampling error.
 struct Gain {

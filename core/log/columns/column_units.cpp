@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <numbers>
+#include <set>
 #include <span>
 
 #include "core/log/columns/import_columns.hpp"
@@ -69,6 +70,13 @@ std::vector<std::string> units_of(const std::string& column) {
   std::vector<std::string> names;
   for (const Unit& u : kind_of(column)) names.emplace_back(u.name);
   return names;
+}
+
+std::vector<std::string> all_units() {
+  std::set<std::string> names;
+  for (const auto& kind : kinds())
+    for (const Unit& u : kind.units) names.insert(u.name);
+  return {names.begin(), names.end()};
 }
 
 std::vector<std::string> mappable_columns() {

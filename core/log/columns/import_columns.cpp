@@ -7,7 +7,6 @@
 #include <cmath>
 #include <span>
 
-#include "core/log/autopilot/turned_attitude.hpp"
 #include "core/log/columns/local_cubic.hpp"
 #include "core/log/columns/log_columns.hpp"
 #include "core/log/columns/median.hpp"
@@ -42,22 +41,25 @@ Eigen::Quaterniond attitude(const FlightLog& log, std::size_t row) {
 }
 
 /// Their numbers in our units: rows with a position, the others' latest numbers; NaN before the first.
-FlightLog in_our_units(const FlightLog& raw, const ColumnMap& map) {
+FlightLog in_our_units(const ForeignTable& table, const ColumnMap& map) {
   FlightLog log;
-  const auto source = [&](const std::string& ours) { return map.columns.at(ours); };
-  const double to_s = *unit_factor("t_s", source("t_s").unit);
+  const auto values = [&](const ColumnMap::Source& source) -> const std::vector<double>& {
+    return table.find(source.name)->values;
+  };
+  const auto& time = values(map.columns.at("t_s"));
+  const double to_s = *unit_factor("t_s", map.columns.at("t_s").unit);
   std::map<std::string, double> latest;
-  const auto first = std::ranges::find_if(raw.t_s, [](double t) { return !std::isnan(t); });
-  if (first == raw.t_s.end()) return log;
-  for (std::size_t row = 0; row < raw.t_s.size(); ++row) {
-    bool placed = !std::isnan(raw.t_s[row]);
+  const auto first = std::ranges::find_if(time, [](double t) { return !std::isnan(t); });
+  if (first == time.end()) return log;
+  for (std::size_t row = 0; row < time.size(); ++row) {
+    bool placed = !std::isnan(time[row]);
     for (const auto& [ours, theirs] : map.columns) {
       if (ours == "t_s") continue;
-      const double value = raw.column(theirs.name)[row] * *unit_factor(ours, theirs.unit);
+      const double value = values(theirs)[row] * *unit_factor(ours, theirs.unit);
       if (!std::isnan(value)) latest[ours] = value;
       if (std::ranges::count(kPosition, ours) && std::isnan(value)) placed = false;
     }
-    const double t = (raw.t_s[row] - *first) * to_s;
+    const double t = (time[row] - *first) * to_s;
     const bool again = !log.t_s.empty() && t == log.t_s.back();
     if (!placed || again || latest.size() + 1 < map.columns.size()) continue;
     log.t_s.push_back(t);
@@ -66,27 +68,48 @@ FlightLog in_our_units(const FlightLog& raw, const ColumnMap& map) {
   return log;
 }
 
-/// Their frames into ours: NED as (east, north, up), FRD as (forward, left, up).
-void turn(FlightLog& log, const ColumnMap& map) {
-  const auto enu = [](const Vec3& v) { return Vec3(v.y(), v.x(), -v.z()); };
-  const auto flu = [](const Vec3& v) { return Vec3(v.x(), -v.y(), -v.z()); };
+/// Their axes into ours: vectors of the world by `world`, of the body by `body`, attitudes by both.
+void turn(FlightLog& log, const Turn& world, const Turn& body) {
+  const Eigen::Quaterniond of_world(world), of_body(body);
   for (std::size_t row = 0; row < log.t_s.size(); ++row) {
-    if (map.ned)
-      for (const Names& names : kWorld)
-        if (has_all(log, names)) set(log, names, row, enu(at(log, names, row)));
+    for (const Names& names : kWorld)
+      if (has_all(log, names)) set(log, names, row, world * at(log, names, row));
     for (const char* height : {"surface_z_m", "stood_z_m"})
-      if (map.ned && log.has(height)) log.columns[height][row] *= -1;
+      if (log.has(height)) log.columns[height][row] *= world.row(2).sum();
     if (has_all(log, kQuaternion)) {
-      Eigen::Quaterniond q = attitude(log, row);
-      if (map.ned) q = enu_of_ned(q);
-      if (map.frd) q = flu_of_frd(q);
+      const Eigen::Quaterniond q = of_world * attitude(log, row) * of_body.conjugate();
       log.columns["qw"][row] = q.w();
       log.columns["qx"][row] = q.x();
       log.columns["qy"][row] = q.y();
       log.columns["qz"][row] = q.z();
     }
-    if (map.frd && has_all(log, kForce)) set(log, kForce, row, flu(at(log, kForce, row)));
+    if (has_all(log, kForce)) set(log, kForce, row, body * at(log, kForce, row));
   }
+}
+
+/// What keys would turn a table whose axes are not up as its map says; empty: none is needed, or the flight does not
+/// tell.
+std::string wrong_axes(const FlightLog& theirs, const ColumnMap& map) {
+  const auto said = [](const std::optional<Turn>& turn) { return turn.value_or(Turn::Identity()); };
+  const auto key = [](const char* name, const Turn& turn, const std::vector<NamedTurn>& names) {
+    return std::string("frame.") + name + " = \"" + called(turn, names) + "\"";
+  };
+  const auto up = up_axes(theirs);
+  if (!up) {
+    if (const auto body = body_up(theirs, said(map.world).transpose() * Vec3::UnitZ());
+        body && said(map.body) * *body != Vec3::UnitZ())
+      return "the body looks up along another axis than its z, on the mean: give " +
+             key("body", upright_body(*body), named_bodies()) + ", or frame.world if its z is not up";
+    const auto flat = map.world ? std::nullopt : flat_height(theirs);
+    if (!flat) return {};
+    return flat->first + ": which axis is up? Give " + key("world", upright_world(flat->second), named_worlds()) +
+           ", or \"enu\" if z is";
+  }
+  std::string keys;
+  if (said(map.world) * up->world != Vec3::UnitZ()) keys = key("world", upright_world(up->world), named_worlds());
+  if (said(map.body) * up->body != Vec3::UnitZ())
+    keys += (keys.empty() ? "" : " and ") + key("body", upright_body(up->body), named_bodies());
+  return keys.empty() ? "" : "the weight and the thrust are along other axes than the map's z: give " + keys;
 }
 
 /// In all rows but one in a hundred, which turn() makes unit ones.
@@ -198,33 +221,40 @@ std::vector<std::vector<std::string>> column_families() {
 
 tl::expected<FlightLog, LogError> import_columns(const std::string& path, const ColumnMap& map,
                                                  std::vector<std::string>* notes) {
-  auto log = import_unchecked(path, map, notes);
-  if (!log) return log;
-  const auto left_out = leave_out_doubted(*log);
-  if (!left_out) return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + left_out.error()});
-  if (notes)
-    for (const auto& what : *left_out) notes->push_back(path + ": " + what);
-  return left_out->empty() ? log : with_motion(std::move(*log));
-}
-
-tl::expected<FlightLog, LogError> import_unchecked(const std::string& path, const ColumnMap& map,
-                                                   std::vector<std::string>* notes) {
   const auto bad = [&](const std::string& what) {
     return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + what});
   };
-  const auto header = csv_names(path);
-  if (!header) return tl::make_unexpected(header.error());
-  std::set<std::string> unread(header->begin(), header->end());
+  const auto table = read_foreign_table(path);
+  if (!table) return tl::make_unexpected(table.error());
+  auto theirs = in_their_axes(*table, path, map, notes);
+  if (!theirs) return theirs;
+  if (const auto why = wrong_axes(*theirs, map); !why.empty()) return bad(why);
+  auto log = in_our_axes(std::move(*theirs), map);
+  if (!log) return bad(log.error());
+  const auto left_out = leave_out_doubted(*log);
+  if (!left_out) return bad(left_out.error());
+  if (notes)
+    for (const auto& what : *left_out) notes->push_back(path + ": " + what);
+  return left_out->empty() ? std::move(*log) : with_motion(std::move(*log));
+}
+
+tl::expected<FlightLog, LogError> in_their_axes(const ForeignTable& table, const std::string& path,
+                                                const ColumnMap& map, std::vector<std::string>* notes) {
+  const auto bad = [&](const std::string& what, std::size_t line = 1) {
+    return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":" + std::to_string(line) + ": " + what});
+  };
   for (const auto& [ours, theirs] : map.columns) {
-    if (!std::ranges::count(*header, theirs.name))
-      return bad("no column '" + theirs.name + "', which the column map takes for " + ours);
+    const auto* column = table.find(theirs.name);
+    if (!column)
+      return bad("no column '" + theirs.name + "', which the column map takes for " + ours + "; it has " +
+                 table.names());
     if (ours != "t_s" && theirs.name == map.columns.at("t_s").name)
       return bad("column '" + theirs.name + "' is the time, and " + ours + " as well");
-    unread.erase(theirs.name);
+    if (column->text_line > 0)
+      return bad("column '" + theirs.name + "' holds '" + column->text + "', which is not a finite number; give one",
+                 column->text_line);
   }
-  const auto raw = read_csv(path, map.columns.at("t_s").name, unread, true);
-  if (!raw) return tl::make_unexpected(raw.error());
-  FlightLog log = in_our_units(*raw, map);
+  FlightLog log = in_our_units(table, map);
   for (const Names& names : {kForce, kMeasured}) {
     const auto t = drawn_on_from(log, names);
     if (!t) continue;
@@ -233,18 +263,23 @@ tl::expected<FlightLog, LogError> import_unchecked(const std::string& path, cons
       notes->push_back(path + ": left out from " + std::to_string(*t) +
                        " s on: the acceleration runs in a straight line there, which no sensor measures");
   }
-  if (const auto why = wrong_stamps(log, map.columns.at("t_s").name); !why.empty()) return bad(why);
   quaternion_of_angles(log);
   if (!unit_quaternions(log))
     return bad("the attitude is no unit quaternion: is it one, and are its four columns named rightly?");
-  turn(log, map);
+  return log;
+}
+
+tl::expected<FlightLog, std::string> in_our_axes(FlightLog log, const ColumnMap& map) {
+  if (const auto why = wrong_stamps(log, map.columns.at("t_s").name); !why.empty()) return tl::make_unexpected(why);
+  if (map.world || map.body) turn(log, map.world.value_or(Turn::Identity()), map.body.value_or(Turn::Identity()));
   if (has_all(log, kForce)) {
-    if (!has_all(log, kQuaternion)) return bad("specific force is in the body: give an attitude as well");
+    if (!has_all(log, kQuaternion))
+      return tl::make_unexpected("specific force is in the body: give an attitude as well");
     acceleration_of_force(log);
   }
   log = with_motion(std::move(log));
   if (log.t_s.size() < 100)
-    return bad(
+    return tl::make_unexpected(
         "too few rows around each position for its velocity: give 30 rows a second, or velocity and acceleration");
   return log;
 }

@@ -35,7 +35,7 @@ constexpr struct {
 };
 
 struct ImportOptions {
-  std::string kind, folder, map_columns, labels;
+  std::string kind, folder, map_columns, columns, labels;
   std::vector<std::string> files;  ///< after `kind`, which is the first of them with a column map
   bool propose = false, json = false, force = false;
 };
@@ -73,7 +73,7 @@ int propose(const ImportOptions& options) {
   if (!options.files.empty()) throw Failure(kUsage, "--propose looks at one table; give one");
   if (!options.folder.empty() || !options.labels.empty())
     throw Failure(kUsage, "--propose prints and writes nothing; give it without --out and --labels");
-  const auto text = proposed_column_map(options.kind);
+  const auto text = proposed_column_map(options.kind, options.columns);
   if (!text) fail(text.error());
   std::fputs(text->c_str(), stdout);
   return kOk;
@@ -111,6 +111,7 @@ void add_labels(log::FlightLog& log, const log::Labels& labels, const std::strin
 
 int run(const ImportOptions& options) {
   if (options.propose) return propose(options);
+  if (!options.columns.empty()) throw Failure(kUsage, "--columns names a table's columns for --propose");
   const auto [read, files] = importer_of(options);
   if (options.folder.empty()) throw Failure(kUsage, "--out is required: the folder for the flight logs");
   std::error_code error;
@@ -170,6 +171,8 @@ Verb import_verb(Command& app) {
                      "table (CSV) of what is known of each recording: its name under recording, and a column a label");
   command.add_flag("--propose", options->propose,
                    "print a column map for one table, guessed and checked; writes nothing");
+  command.add_option("--columns", options->columns,
+                     "with --propose: names in place of the table's own, as t,x,y,z,- (- leaves one out)");
   command.add_flag("--json", options->json, "one JSON object on stdout");
   command.add_flag("--force", options->force, "overwrite logs that exist");
   command.footer(

@@ -6,7 +6,9 @@
 #include <cctype>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <sstream>
+#include <tuple>
 #include <vector>
 
 #include "core/config/strict_table.hpp"
@@ -43,11 +45,17 @@ struct Known {
 const std::vector<Known>& known() {
   static const std::vector<Known> all{
       {"t_s",
-       {"t_s", "t", "time", "timestamp", "time_s", "timestamp_us", "time_us", "stamp", "time_ms", "timestamp_ns"}},
-      {"%_m", {"%_m", "p%", "pos_%", "position_%", "position.%", "%", "stateestimate.%", "est_stateestimate_%", "pn%"}},
-      {"v%_mps", {"v%_mps", "v%", "vel_%", "velocity_%", "velocity.%", "stateestimate.v%", "est_stateestimate_v%"}},
+       {"t_s", "t", "time", "timestamp", "time_s", "timestamp_us", "time_us", "stamp", "time_ms", "timestamp_ns",
+        "frame/rate"}},
+      {"%_m",
+       {"%_m", "p%", "pos_%", "position_%", "position.%", "%", "stateestimate.%", "est_stateestimate_%", "pn%", "t%",
+        "position %", "%_pos", "pose.position.%", "pose.pose.position.%"}},
+      {"v%_mps",
+       {"v%_mps", "v%", "vel_%", "velocity_%", "velocity.%", "stateestimate.v%", "est_stateestimate_v%", "velocity %"}},
       {"acceleration_%", {"a%_mps2", "a%", "acc_%", "accel_%", "acc.%", "imu_acc_%", "acceleration_%", "a%_g", "acc%"}},
-      {"q%", {"q%", "quat_%", "orientation_%", "orientation.%", "q_%", "stateestimate.q%"}},
+      {"q%",
+       {"q%", "quat_%", "orientation_%", "orientation.%", "q_%", "stateestimate.q%", "rotation %", "pose.orientation.%",
+        "pose.pose.orientation.%"}},
       {"roll", {"roll", "roll_deg", "roll_rad", "stabilizer.roll"}},
       {"pitch", {"pitch", "pitch_deg", "pitch_rad", "stabilizer.pitch"}},
       {"yaw", {"yaw", "yaw_deg", "yaw_rad", "stabilizer.yaw"}},
@@ -66,16 +74,45 @@ std::string filled(std::string pattern, char with) {
   return pattern;
 }
 
-std::optional<std::string> called(const std::vector<std::string>& header, const std::vector<const char*>& names,
-                                  char with) {
-  for (const char* name : names)
-    for (const auto& column : header)
-      if (lower(column) == filled(name, with)) return column;
+/// The words of a name, lower case; "Position X" and "p_RS_R_x" have the quantity first and the axis last.
+std::vector<std::string> words(const std::string& name) {
+  std::vector<std::string> all(1);
+  for (const char c : lower(name)) {
+    if (std::isalnum(static_cast<unsigned char>(c))) {
+      all.back() += c;
+    } else if (!all.back().empty()) {
+      all.emplace_back();
+    }
+  }
+  if (all.back().empty()) all.pop_back();
+  return all;
+}
+
+/// A column that is called so; else one whose name ends so, after an object's; else one with names of frames between
+/// the quantity and the axis. The first of each.
+std::optional<std::string> called(const log::ForeignTable& table, const std::vector<const char*>& names, char with) {
+  using Fits = bool (*)(const std::string& column, const std::string& name);
+  constexpr Fits kFits[] = {[](const std::string& column, const std::string& name) {
+                              return lower(column) == name || lower(column) == "#" + name;
+                            },
+                            [](const std::string& column, const std::string& name) {
+                              const auto have = words(column), want = words(name);
+                              return !name.empty() && name.size() > 1 && have.size() > want.size() &&
+                                     std::ranges::equal(std::span(have).last(want.size()), want);
+                            },
+                            [](const std::string& column, const std::string& name) {
+                              const auto have = words(column);
+                              return have.size() > 2 && have.front() + have.back() == name;
+                            }};
+  for (const Fits fits : kFits)
+    for (const char* name : names)
+      for (const auto& column : table.columns)
+        if (fits(column.name, filled(name, with))) return column.name;
   return std::nullopt;
 }
 
 /// Every column of ours that some column of theirs is called like; acceleration_x … stands for either kind.
-std::map<std::string, std::string> guessed(const std::vector<std::string>& header) {
+std::map<std::string, std::string> guessed(const log::ForeignTable& header) {
   std::map<std::string, std::string> found;
   for (const auto& [ours, theirs] : known()) {
     const std::string name = ours;
@@ -97,22 +134,25 @@ std::map<std::string, std::string> guessed(const std::vector<std::string>& heade
   return found;
 }
 
-/// The unit of a column that no frame decides: from how often its numbers come, or how large they are.
-std::string unit_of(const std::string& ours, const log::FlightLog& table, const std::string& theirs) {
+/// The unit of a column that no frame decides: as the table states it, or from how often its numbers come, or how large
+/// they are.
+std::string unit_of(const std::string& ours, const log::ForeignTable::Column& theirs) {
+  if (!theirs.unit.empty() && log::unit_factor(ours, theirs.unit)) return theirs.unit;
   if (ours == "t_s") {
     std::vector<double> steps;
-    for (std::size_t i = 1; i < table.t_s.size(); ++i) steps.push_back(table.t_s[i] - table.t_s[i - 1]);
+    for (std::size_t i = 1; i < theirs.values.size(); ++i)
+      if (const double step = theirs.values[i] - theirs.values[i - 1]; step > 0) steps.push_back(step);
     if (steps.empty()) return "s";
     const double step = log::median(std::move(steps));
     return step < 0.1 ? "s" : step < 100 ? "ms" : step < 1e5 ? "us" : "ns";
   }
   double most = 0;
-  for (const double value : table.column(theirs))
+  for (const double value : theirs.values)
     if (std::isfinite(value)) most = std::max(most, std::abs(value));
   if (ours == "thrust" || ours.starts_with("motor")) return most <= 1.2 ? "1" : most <= 100 ? "percent" : "u16";
   if (ours == "battery_v") return most > 100 ? "mV" : "V";
   if (ours == "roll" || ours == "pitch" || ours == "yaw")
-    return most > 6.4 || lower(theirs).ends_with("deg") ? "deg" : "rad";
+    return most > 6.4 || lower(theirs.name).ends_with("deg") ? "deg" : "rad";
   return "";
 }
 
@@ -120,8 +160,10 @@ std::string written(const ColumnMap& map, const std::vector<std::string>& doubts
   std::string text = "# A guess from the names of the columns";
   text += doubts.empty() ? ", and nothing in the numbers contradicts it.\n" : ". The numbers contradict it:\n";
   for (const auto& doubt : doubts) text += "#   " + doubt + "\n";
-  text += std::string("[frame]\nworld = \"") + (map.ned ? "ned" : "enu") + "\"\nbody = \"" + (map.frd ? "frd" : "flu") +
-          "\"\n\n[columns]\n";
+  text += "[frame]\n";
+  if (map.world) text += "world = \"" + log::called(*map.world, log::named_worlds()) + "\"\n";
+  if (map.body) text += "body = \"" + log::called(*map.body, log::named_bodies()) + "\"\n";
+  text += "\n[columns]\n";
   for (const auto& [ours, theirs] : map.columns) {
     toml::table one;
     one.insert(ours, theirs.name + (theirs.unit.empty() ? "" : " [" + theirs.unit + "]"));
@@ -130,6 +172,46 @@ std::string written(const ColumnMap& map, const std::vector<std::string>& doubts
     text += line.str() + "\n";
   }
   return text;
+}
+
+/// What a table without a header holds, or one that the user names: his names, "-" for what is left out; else those of
+/// the trajectories of TUM, which eight columns with a unit quaternion at the end are.
+tl::expected<std::vector<std::string>, std::string> titles_of(const log::ForeignTable& table,
+                                                              const std::string& names) {
+  std::vector<std::string> titles;
+  for (const auto& column : table.columns) titles.push_back(column.name);
+  if (!names.empty()) {
+    std::vector<std::string> given(1);
+    for (const char c : names) {
+      if (c == ',') given.emplace_back();
+      if (c != ',' && c != ' ') given.back() += c;
+    }
+    if (given.size() != titles.size())
+      return tl::make_unexpected("--columns names " + std::to_string(given.size()) + " columns, the table has " +
+                                 std::to_string(titles.size()) + "; name each, - for one to leave out");
+    return given;
+  }
+  constexpr std::array kTum{"t", "tx", "ty", "tz", "qx", "qy", "qz", "qw"};
+  if (table.named || titles.size() != kTum.size()) return titles;
+  for (std::size_t row = 0; row < table.columns[0].values.size(); ++row) {
+    double square = 0;
+    for (std::size_t c = 4; c < kTum.size(); ++c) square += std::pow(table.columns[c].values[row], 2);
+    if (std::abs(square - 1) > 0.02) return titles;
+  }
+  return std::vector<std::string>(kTum.begin(), kTum.end());
+}
+
+/// The turns of world and body to try: what the numbers say; else the named ones, or none of a world that only its user
+/// knows.
+std::vector<std::pair<std::optional<log::Turn>, std::optional<log::Turn>>> turns_for(const log::FlightLog& theirs) {
+  if (const auto up = log::up_axes(theirs)) return {{log::upright_world(up->world), log::upright_body(up->body)}};
+  const auto up_body = log::body_up(theirs, Vec3::UnitZ());
+  if (log::flat_height(theirs)) return {{std::nullopt, std::nullopt}};
+  if (up_body && std::abs(up_body->z()) < 1) return {{log::Turn::Identity(), log::upright_body(*up_body)}};
+  std::vector<std::pair<std::optional<log::Turn>, std::optional<log::Turn>>> all;
+  for (const auto& world : log::named_worlds())
+    for (const auto& body : log::named_bodies()) all.emplace_back(world.turn, body.turn);
+  return all;
 }
 
 }  // namespace
@@ -144,20 +226,18 @@ tl::expected<ColumnMap, config::ConfigError> read_column_map(const std::string& 
   for (const auto& column : paths) allowed.push_back(config::read_elsewhere(column));
   if (auto read = table->read(allowed); !read) return tl::make_unexpected(read.error());
   ColumnMap map;
-  const auto one_of = [&](const char* key, const char* usual,
-                          const char* other) -> tl::expected<bool, config::ConfigError> {
-    if (!table->has(key)) return false;
+  for (const auto& [key, into, names] :
+       {std::tuple{"frame.world", &map.world, &log::named_worlds()}, {"frame.body", &map.body, &log::named_bodies()}}) {
+    if (!table->has(key)) continue;
     const auto text = table->text(key);
     if (!text) return tl::make_unexpected(text.error());
-    if (*text != usual && *text != other)
-      return tl::make_unexpected(table->error(key, "is '" + std::string(usual) + "' or '" + other + "'"));
-    return *text == other;
-  };
-  const auto ned = one_of("frame.world", "enu", "ned"), frd = one_of("frame.body", "flu", "frd");
-  if (!ned) return tl::make_unexpected(ned.error());
-  if (!frd) return tl::make_unexpected(frd.error());
-  map.ned = *ned;
-  map.frd = *frd;
+    const auto known = std::ranges::find(*names, *text, [](const auto& n) { return std::string(n.name); });
+    *into = known != names->end() ? std::optional(known->turn) : log::turn_of(*text);
+    if (!*into)
+      return tl::make_unexpected(
+          table->error(key, std::string("is '") + names->front().name + "', '" + names->back().name +
+                                "', or our x, y and z in theirs, right-handed, as 'x, -z, y' where y is up"));
+  }
   for (const auto& name : log::mappable_columns()) {
     const std::string key = "columns." + name;
     if (!table->has(key)) continue;
@@ -182,24 +262,27 @@ tl::expected<ColumnMap, config::ConfigError> read_column_map(const std::string& 
   return map;
 }
 
-tl::expected<std::string, log::LogError> proposed_column_map(const std::string& table) {
-  const auto header = log::csv_names(table);
-  if (!header) return tl::make_unexpected(header.error());
-  auto found = guessed(*header);
-  const auto lacks = [&](const char* what, const std::string& names) {
-    return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data,
-                                             table + ":1: no column is called like " + what + "; it has " + names});
+tl::expected<std::string, log::LogError> proposed_column_map(const std::string& path, const std::string& names) {
+  auto table = log::read_foreign_table(path);
+  if (!table) return tl::make_unexpected(table.error());
+  const auto bad = [&](const std::string& what) {
+    return tl::make_unexpected(log::LogError{log::LogError::Kind::bad_data, path + ":1: " + what});
   };
-  if (!found.contains("t_s")) return lacks("a time", list(*header));
-  if (!found.contains("x_m")) return lacks("a position", list(*header));
-  std::set<std::string> unread(header->begin(), header->end());
-  for (const auto& [ours, theirs] : found) unread.erase(theirs);
-  const auto raw = log::read_csv(table, found.at("t_s"), unread, true);
-  if (!raw) return tl::make_unexpected(raw.error());
+  const auto titles = titles_of(*table, names);
+  if (!titles) return bad(titles.error());
+  log::ForeignTable titled = *table;
+  for (std::size_t i = 0; i < titles->size(); ++i) titled.columns[i].name = (*titles)[i];
+  auto found = guessed(titled);
+  for (const auto& [ours, what] : {std::pair{"t_s", "a time"}, {"x_m", "a position"}})
+    if (!found.contains(ours))
+      return bad(std::string("no column is called like ") + what + "; it has " + table->names() +
+                 ": name them by --columns, a name each in their order, as t,x,y,z,- (- is left out)");
+  for (auto& [ours, title] : found)  // as the file has it
+    title = table->columns[static_cast<std::size_t>(titled.find(title) - titled.columns.data())].name;
 
   ColumnMap base;
   for (const auto& [ours, theirs] : found)
-    if (!ours.starts_with("acceleration_")) base.columns[ours] = {theirs, unit_of(ours, *raw, theirs)};
+    if (!ours.starts_with("acceleration_")) base.columns[ours] = {theirs, unit_of(ours, *table->find(theirs))};
   const bool turned = found.contains("qw") || found.contains("roll");
   std::vector<std::array<std::string, 2>> kinds{{"", ""}};  // of acceleration: ours, unit
   if (found.contains("acceleration_x")) {
@@ -208,24 +291,30 @@ tl::expected<std::string, log::LogError> proposed_column_map(const std::string& 
   }
   ColumnMap best;
   std::optional<std::vector<std::string>> doubts;
-  for (const auto& [kind, unit] : kinds)
-    for (const bool ned : {false, true})
-      for (const bool frd : {false, true}) {
-        ColumnMap map = base;
-        map.ned = ned;
-        map.frd = frd;
-        for (const char c : std::string(kind.empty() ? "" : "xyz"))
-          map.columns[filled(kind, c)] = {found.at(std::string("acceleration_") + c), unit};
-        const auto flight = log::import_unchecked(table, map);
-        std::vector<std::string> wrong;
-        if (!flight) wrong.push_back(flight.error().message);
-        if (flight)
-          for (const auto& doubt : log::contradictions(*flight)) wrong.push_back(doubt.words);
-        if (!doubts || wrong.size() < doubts->size()) {
-          best = map;
-          doubts = wrong;
-        }
+  for (const auto& [kind, unit] : kinds) {
+    ColumnMap map = base;
+    for (const char c : std::string(kind.empty() ? "" : "xyz"))
+      map.columns[filled(kind, c)] = {found.at(std::string("acceleration_") + c), unit};
+    const auto theirs = log::in_their_axes(*table, path, map);
+    if (!theirs) {
+      if (!doubts) best = map, doubts = {theirs.error().message};
+      continue;
+    }
+    for (const auto& [world, body] : turns_for(*theirs)) {
+      map.world = world;
+      map.body = body;
+      const auto flight = log::in_our_axes(*theirs, map);
+      std::vector<std::string> wrong;
+      if (!flight) wrong.push_back(flight.error());
+      if (flight)
+        for (const auto& doubt : log::contradictions(*flight)) wrong.push_back(doubt.words);
+      if (!world) wrong.push_back(log::flat_height(*theirs)->first + ": say which axis is up by frame.world");
+      if (!doubts || wrong.size() < doubts->size()) {
+        best = map;
+        doubts = wrong;
       }
+    }
+  }
   return written(best, *doubts);
 }
 
