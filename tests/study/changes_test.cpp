@@ -313,6 +313,16 @@ TEST(Changes, AMassByThirdsOfTheCampaignIsToldWithItsSteps) {
   EXPECT_EQ(when, (std::vector<std::string>{"from flight 5 on", "from flight 9 on"})) << study_worlds::told(result);
 }
 
+/// Every flight discharges alike: a mass and one more since a moment of each flight imitate the voltage.
+TEST(Changes, AVoltageThatSagsAlikeInEachFlightIsNoStepOfTheMass) {
+  const auto world = study_worlds::draw_world({1820000144, {"battery_sag"}, 1, 12, "battery"});
+  auto options = study_worlds::with_reference(world, folder());
+  options.minimum_detectable = options.dependence = false;
+  const auto result = study(study_worlds::observe(world, folder()), options);
+  ASSERT_EQ(result.causes.size(), 1u) << study_worlds::told(result);
+  EXPECT_EQ(result.causes.front().found.form->cause(), "battery_sag") << study_worlds::told(result);
+}
+
 TEST(Changes, AreToldWithTheirFlightOrTheirMoment) {
   const auto from = study_worlds::score(study_worlds::SharedFault{"draft", 6, "from", 3}, 500, folder());
   EXPECT_TRUE(from.exact() && !from.wrong) << from.told;

@@ -238,7 +238,8 @@ TEST(Design, OfRotorsThatMotorsAloneTellIsNone) {
   auto result = never_turned().result;
   const auto& w = never_turned();
   const auto alone = [](const char* cause) {
-    return *std::ranges::find_if(catalogue(), [&](auto* f) { return f->cause() == cause && f->motors_alone; });
+    return *std::ranges::find_if(
+        catalogue(), [&](auto* f) { return f->cause() == cause && f->needs == std::vector{Source::motors}; });
   };
   Accepted& found = result.causes.front().found;
   found.form = alone("propeller_damage");

@@ -57,6 +57,26 @@ Accepted refined(const Observations& seen, const std::string& cause, const Scale
   return found;
 }
 
+/// A voltage that sagged was fitted to the noise of the thrust's delay, and lost 44 nats to a step of the mass.
+TEST(Evidence, TheScatterOfAChannelIsNoneOfANoisierOneOfTheSameCause) {
+  constexpr double kScatter = 0.05, kNoisier = 30 * kScatter, kSize = 0.5, kOfDelay = 0.3;  // 24 to 32 in the worlds
+  Observations seen = flights();
+  DesignColumn column{{{kMeanZ, {}}, {kThrustDelay, {}}}};
+  std::mt19937 rng(23);
+  std::normal_distribution normal;
+  for (std::size_t i = 0; i < seen.windows.size(); ++i) {
+    const double x = static_cast<double>(i % kOfFlight) / kOfFlight;
+    column.parts[0].x.push_back(x);
+    column.parts[1].x.push_back(kOfDelay);
+    measure(seen, kMeanZ, i, kSize * x + kScatter * normal(rng));
+    measure(seen, kThrustDelay, i, kSize * kOfDelay + kNoisier * normal(rng));
+  }
+  Evidence evidence(seen);
+  evidence.whiten({column});
+  EXPECT_NEAR(std::sqrt(evidence.scatter(kMeanZ).within), kScatter, 0.1 * kScatter);
+  EXPECT_NEAR(std::sqrt(evidence.scatter(kThrustDelay).within), kNoisier, 0.1 * kNoisier);
+}
+
 TEST(AveragedEstimate, OfOneModelIsItsNormalInterval) {
   const Estimate e = averaged("x", {{3, 1.2, 0.5}});
   EXPECT_NEAR(e.value, 1.2, 1e-12);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/study/design/design_rules.hpp"
+#include "core/study/inference/rotors/sound_rotors.hpp"
 #include "core/types/normal.hpp"
 
 namespace backwash::study {
@@ -123,7 +124,7 @@ Contest::Duel Contest::duel(std::size_t truth, std::size_t rival) const {
   append(both, other);
   const auto nuisance = beside(both, ours.form->constant || theirs.form->constant, seen);
   const NormalEquations we = flown_->normal(own, nuisance), they = flown_->normal(other, nuisance);
-  d.never = !we.solvable || !they.solvable || (ours.form->motors_alone && theirs.form->motors_alone);
+  d.never = !we.solvable || !they.solvable || (rotor_state(*ours.form) && rotor_state(*theirs.form));
   if (d.never) return d;
   d.theta = we.fit();
   d.gain = we.gain();

@@ -106,7 +106,6 @@ struct Form {
   std::optional<Reach> reach = {};
   bool integer_scale = false;      ///< a number of a rotor or pairing, or an offset of its own search: not polished
   bool displaces_map = false;      ///< its scale is an offset, fitted along x and y
-  bool motors_alone = false;       ///< seen in motor commands alone: which of such forms it is they do not tell
   bool constant = false;           ///< is itself what a free offset would be: tested without one
   bool in_sensor = false;          ///< is told by a sensor and pushes nothing
   bool by_place = false;           ///< a push that differs by place: it moves the craft in itself

@@ -11,7 +11,8 @@ namespace backwash::study {
 namespace {
 
 std::string interval(const RotorVerdict& v) {
-  return percent(v.d) + " [" + percent(v.low) + ", " + percent(v.high) + "]";
+  const RotorNeed& need = v.told.each[v.told.rotor];
+  return percent(need.d) + " [" + percent(need.low) + ", " + percent(need.high) + "]";
 }
 
 std::string ratio(const std::optional<calibrate::CalibratedValue>& e) {
@@ -52,7 +53,7 @@ std::string too_few(const Observations& seen) {
 
 std::string rotor_sentence(const RotorVerdict& v) {
   using Kind = RotorVerdict::Kind;
-  const std::string rotor = "rotor " + std::to_string(v.rotor);
+  const std::string rotor = "rotor " + std::to_string(v.told.rotor + 1);
   switch (v.kind) {
     case Kind::as_sound:
       return "As the sound flights: a propeller that needs " + percent(v.minimum) +
@@ -60,9 +61,10 @@ std::string rotor_sentence(const RotorVerdict& v) {
     case Kind::propeller_damage:
       return "The propeller of " + rotor + " is damaged: it needs " + interval(v) + " more of its command.";
     case Kind::payload:
-      return "An off-centre weight, no damaged propeller.";
+      return "An off-centre weight, no damaged propeller: rotor " + std::to_string(v.told.heavy + 1) +
+             " carries most of it, " + percent(v.told.weight) + " more than the mean.";
     case Kind::cannot_distinguish:
-      if (v.set.front() != RotorState::sound)
+      if (!v.told.holds(RotorState::sound))
         return "A damaged propeller of " + rotor + " or a weight near it: these flights cannot tell.";
       return "Not told from the sound flights, nor from a small damage or weight: " + rotor + " differs most, by " +
              interval(v) + " of its command, and only a propeller that needs " + percent(v.minimum) +
@@ -77,15 +79,16 @@ std::string rotor_section(const RotorVerdict& v, report::PageData& data) {
   using enum report::Shape;
   report::DataTable table{"rotors", {"rotor", "percent", "percent_low", "percent_high"}, {}, 0};
   report::Layer most{dots, after, "if this rotor alone, 95 %", {{}}}, bars{line, after, "", {}};
-  for (std::size_t r = 0; r < v.each.size(); ++r) {
-    const auto& e = v.each[r];
+  for (std::size_t r = 0; r < v.told.each.size(); ++r) {
+    const auto& e = v.told.each[r];
     const auto at = static_cast<double>(r) + 1;
     table.rows.push_back({at, 100 * e.d, 100 * e.low, 100 * e.high});
     most.runs[0].push_back({at, 100 * e.d});
     bars.runs.push_back({{at, 100 * e.low}, {at, 100 * e.high}});
   }
   data.tables.push_back(std::move(table));
-  const double first = 0.5, last = first + static_cast<double>(v.each.size());  // half a rotor beside the outer ones
+  const double first = 0.5,
+               last = first + static_cast<double>(v.told.each.size());  // half a rotor beside the outer ones
   const auto level = [first, last](double y) { return report::Run{{first, y}, {last, y}}; };
   const report::Chart chart{.x = {"", first, last, false, {"rotor 1", "rotor 2", "rotor 3", "rotor 4"}},
                             .y = {"command needed more, %"},
@@ -97,11 +100,13 @@ std::string rotor_section(const RotorVerdict& v, report::PageData& data) {
   return report::section(
       "Rotors against sound flights", report::escaped(rotor_sentence(v)),
       report::to_svg(chart) + report::files_html({"rotors"}) +
-          report::table(row("Command that rotor " + std::to_string(v.rotor) + " needs more, at 95 %", interval(v)) +
-                        row("Smallest that is named with 80 % power", percent(v.minimum)) +
-                        row("Damage of one propeller, t", number(v.t_d) + " (needed " + number(v.needed) + ")") +
-                        row("Twist, which a weight does not give, t", number(v.t_yaw)) +
-                        row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t_a) + ", " + number(v.t_b))));
+          report::table(
+              row("Command that rotor " + std::to_string(v.told.rotor + 1) + " needs more, at 95 %", interval(v)) +
+              row("Smallest that is named with 80 % power", percent(v.minimum)) +
+              row("Damage of one propeller over a sound craft, nats",
+                  number(v.told.lead) + " (chance " + number(v.told.needed) + ")") +
+              row("Twist, which a weight does not give, t", number(v.t[0])) +
+              row("Rotors 1 and 3, rotors 2 and 4 apart, t", number(v.t[1]) + ", " + number(v.t[2]))));
 }
 
 std::string height_sentence(const calibrate::HeightEffects& effects) {

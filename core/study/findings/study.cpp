@@ -11,7 +11,6 @@
 #include "core/study/findings/words.hpp"
 #include "core/study/inference/estimate.hpp"
 #include "core/study/inference/rivals.hpp"
-#include "core/study/inference/rotors/rotor_rules.hpp"
 
 namespace backwash::study {
 namespace {
@@ -23,8 +22,9 @@ std::size_t flown(const Observations& seen) {
   return count;
 }
 
-/// Effects and why they are not tested. `unjudged`: by how much the rotors differ without being judged, ln.
-std::vector<std::pair<std::string, std::string>> untested(const Observations& seen, std::optional<double> unjudged) {
+/// Effects and why they are not tested. `unjudged`: by how much the rotors differ without being judged, ln; 0: they
+/// are.
+std::vector<std::pair<std::string, std::string>> untested(const Observations& seen, double unjudged) {
   std::vector<std::pair<std::string, std::string>> all;
   for (const Effect& effect : effects()) {
     std::string why;
@@ -37,10 +37,10 @@ std::vector<std::pair<std::string, std::string>> untested(const Observations& se
     if (!tested) all.emplace_back(effect.name, why);
   }
   for (const Effect& effect : effects())
-    if (unjudged && (effect.at_rotors == AtRotors::propeller || effect.at_rotors == AtRotors::sensor))
+    if (unjudged > 0 && (effect.at_rotors == AtRotors::propeller || effect.at_rotors == AtRotors::sensor))
       all.emplace_back(effect.name,
                        "the same in all flights and no more than craft are built with: the rotors differ by " +
-                           percent(*unjudged) + ", as those of a sound craft may; give --reference flights");
+                           percent(unjudged) + ", as those of a sound craft may; give --reference flights");
   return all;
 }
 
@@ -123,17 +123,14 @@ struct Doubt {
   std::string what;
 };
 
-/// A rotor that lost a share of its thrust costs a quarter of it in all. Where the rotors differ as such a one would,
-/// unjudged, a payload is not told from it.
-std::optional<Doubt> doubted_payload(const NamedCause& cause, double unjudged) {
+/// A mass costs thrust, and so does one weak rotor.
+std::optional<Doubt> doubted_payload(const NamedCause& cause, const std::optional<RotorLevel>& level) {
   const Accepted& found = cause.found;
-  if (found.form->effect->at_rotors != AtRotors::weight || found.form->motors_alone || !cause.flights.empty() ||
-      found.parameters.empty())
+  if (found.form->effect->at_rotors != AtRotors::weight || rotor_state(*found.form) || !cause.flights.empty() ||
+      !level || !may_be_one_rotor(*level, found.theta[0]))
     return std::nullopt;
-  const double lost = found.theta[0];
-  if (lost <= 0 || unjudged < kRotorRules.unjudged_loss * lost) return std::nullopt;
-  const auto propeller = std::ranges::find_if(
-      catalogue(), [](auto* form) { return form->effect->at_rotors == AtRotors::propeller && !form->motors_alone; });
+  const auto propeller =
+      std::ranges::find_if(catalogue(), [](auto* form) { return rotor_state(*form) == RotorState::propeller_damage; });
   return Doubt{*propeller, "none: give --reference flights of the craft while its rotors were sound"};
 }
 
@@ -165,21 +162,16 @@ std::optional<Doubt> doubted_drift(const NamedCause& cause, const Observations& 
   return Doubt{*sag, "none: log the battery's voltage (battery_v)"};
 }
 
-/// All that was found, with what it is told apart by. `unjudged`: as of untested().
+/// All that was found, with what it is told apart by. `level`: of all rotors (SettledRotors).
 std::vector<NamedCause> causes_of(const WholeSearch& whole, const Evidence& evidence, const Observations& seen,
-                                  std::optional<double> unjudged, const std::optional<SoundRotors>& sound,
-                                  SteadyAnswer& answer) {
+                                  const std::optional<RotorLevel>& level, SteadyAnswer& answer) {
   std::vector<NamedCause> causes = in_all_flights(evidence, whole.found.accepted, answer);
   for (const auto& cause : whole.changes) causes.push_back(named(cause, evidence));
-  const double between_craft = sound ? sound->spread : kRotorRules.rotor_spread.value;
   for (auto& cause : causes) {
-    const bool some = !cause.flights.empty();  // against the craft's own other flights
-    const double spread = some ? kRules.motor_scatter.value : between_craft;
-    cause.found = in_words(name_by_balance(std::move(cause.found), whole.rest, some, spread));
+    cause.found = in_words(std::move(cause.found));
     for (const Rival& rival : cause.found.rivals)
       cause.separate_by.push_back(separations(evidence, cause.found, rival).front());
-    const auto payload = unjudged ? doubted_payload(cause, *unjudged) : std::nullopt;
-    for (const auto& doubt : {payload, doubted_drift(cause, seen)}) {
+    for (const auto& doubt : {doubted_payload(cause, level), doubted_drift(cause, seen)}) {
       if (!doubt) continue;
       cause.found.rivals.push_back({doubt->form->cause(), doubt->form, doubt->form->scales.front(), 0});
       cause.separate_by.push_back({doubt->form->cause(), doubt->what, std::nullopt});
@@ -206,14 +198,14 @@ const char* to_string(StudyVerdict verdict) {
 
 StudyResult study(const Observations& seen, const StudyOptions& options) {
   if (static_cast<double>(flown(seen)) < kRules.fewest_flights)
-    return {.verdict = StudyVerdict::insufficient, .not_tested = untested(seen, std::nullopt)};
+    return {.verdict = StudyVerdict::insufficient, .not_tested = untested(seen, 0)};
   SettledRotors settled = settle_rotors(options.sound, seen);
   const WholeSearch whole = search_all(std::move(settled.seen), options.search);
   const CauseSearchResult& found = whole.found;
   Evidence evidence = whole.evidence();
   evidence.whiten(columns_of(found.accepted, whole.rest));
   SteadyAnswer answer;
-  const auto causes = causes_of(whole, evidence, seen, settled.unjudged, options.sound, answer);
+  const auto causes = causes_of(whole, evidence, seen, settled.level, answer);
   const bool silent = causes.empty() && found.unknown.empty() && options.search.known.empty();
   const auto remaining =
       options.dependence ? what_remains(evidence, found.accepted, silent, options.search) : std::vector<Dependence>{};

@@ -286,23 +286,26 @@ double Evidence::likeliest_age(const std::vector<DesignColumn>& accepted) const 
   return alone.excited ? std::clamp(age_ + alone.fit()[0], -most, most) : 0;
 }
 
+/// Channels of one column differ in their scatter, so the fit that leaves a scatter is weighed by one: first by 1.
 void Evidence::whiten(const std::vector<DesignColumn>& accepted) {
   scatter_.fill({1, 0, 0});
   tilt_ = 0;
-  set_age(likeliest_age(accepted));
   std::vector<DesignColumn> columns = offsets(accepted, *seen_);
   columns.insert(columns.end(), accepted.begin(), accepted.end());
-  const DesignColumn rest = residual(columns);
   const auto scatter_of = [&](const DesignColumn::Part& r) {
     scatter_[r.channel] = anova(r.channel, r.x, weight_[r.channel], seen_->units, flight_end_);
   };
-  for (const auto& r : rest.parts)
-    if (r.channel == kVarX) {
-      scatter_of(r);
-      weigh_means(r.x);
-    }
-  std::ranges::for_each(rest.parts, scatter_of);
-  if (!tilts_.empty()) tilt_ = trim_scatter(rest);
+  for (int round = 0; round < kRules.rounds; ++round) {
+    set_age(likeliest_age(accepted));
+    const DesignColumn rest = residual(columns);
+    for (const auto& r : rest.parts)
+      if (r.channel == kVarX) {
+        scatter_of(r);
+        weigh_means(r.x);
+      }
+    std::ranges::for_each(rest.parts, scatter_of);
+    if (!tilts_.empty()) tilt_ = trim_scatter(rest);
+  }
 }
 
 std::vector<double> Evidence::ln_likelihood(const std::vector<DesignColumn>& accepted) const {

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/study/inference/rotors/sound_rotors.hpp"
+
 namespace backwash::study {
 
 std::vector<DesignColumn> columns_of(const std::vector<Accepted>& accepted, const Observations& seen, std::size_t but) {
@@ -82,12 +84,6 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
       if (rest.solvable && rest.gain() > kRules.rival_rest * theirs.gain()) continue;
       auto [lead, error] = lead_over(ours, theirs);
       lead += rival.prior_nats(size) - prior_nats_of(own);
-      // Motor commands alone do not tell a damaged rotor from a weight near it, whichever fits better: only the line of
-      // its rate does.
-      if (own.form->motors_alone && form.motors_alone) {
-        found.push_back({form.cause(), &form, scale, lead});
-        continue;
-      }
       if (lead > needed_lead(error, dynamic(own.columns) || dynamic(columns) ? ours.gain() : 0.0)) continue;
       found.push_back({form.cause(), &form, scale, lead});
     }
@@ -96,6 +92,7 @@ void find_rivals(const Evidence& evidence, std::vector<Accepted>& accepted, std:
   for (const auto& rival : found)
     if (std::none_of(own.rivals.begin(), own.rivals.end(), [&](auto& r) { return r.name == rival.name; }))
       own.rivals.push_back(rival);
+  if (const auto told = rotor_state(*own.form) ? rotors_of(evidence.seen()) : std::nullopt) name_rotors(own, *told);
 }
 
 }  // namespace backwash::study

@@ -50,7 +50,7 @@ struct Rules {
   // Scatter
   Rule motor_scatter{"motor_scatter", 0.01, "1",
                      "chosen: so well do reference flights tell a rotor's share (docs/measurements/recordings.md); "
-                     "craft differ by rotor_spread"};
+                     "craft differ by built_scatter"};
   Rule dropout_scatter{"dropout_scatter", 0.003, "1", "chosen: of readings, lost by a sound sensor"};
   Rule least_scatter{"least_scatter", 1e-8, "channel²", "derived: so that an exact channel can be divided by"};
   Rule least_rotor_scatter{"least_rotor_scatter", 1e-6, "1",
@@ -72,7 +72,8 @@ struct Rules {
   Rule normal_975{"normal_975", normal::k975, "1", "derived: its quantile of the normal distribution"};
   Rule fine_scales{"fine_scales", 12, "scales", "chosen: the likelihood is averaged over so many"};
   Rule beyond_scales{"beyond_scales", 1.5, "1", "chosen: the finer grid goes so far beyond the searched scales"};
-  Rule rounds{"rounds", 2, "rounds", "chosen: of the likeliest shape and where it pushes the craft"};
+  Rule rounds{"rounds", 2, "rounds",
+              "chosen: of the likeliest shape and where it pushes the craft; of a fit and its scatter"};
   Rule turns{
       "turns", 4, "turns",
       "derived: each leaves the push's slope over k_p of the error: 0.15 at 0.3 m/s² over 0.2 m, 5e-4 after four"};
@@ -98,7 +99,6 @@ struct Rules {
   Rule rotor_level{"rotor_level", 0.05, "1", "chosen: over the four rotors"};
   Rule rotor_of_interest{"rotor_of_interest", 0.06, "of one rotor's thrust",
                          "derived: the size of docs/measurements/confusion.md"};
-  Rule normal_80{"normal_80", normal::k80, "1", "derived: quantile of the normal distribution at `power`"};
   Rule fewest_sound{"fewest_sound", 4, "flights", "derived: three contrasts and a scatter"};
   // Causes in some flights only
   Rule fewest_divided{"fewest_divided", 6, "flights", "derived: two levels and a scatter about each"};

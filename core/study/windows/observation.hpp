@@ -134,6 +134,13 @@ struct Units {
   std::size_t size() const { return first.size() - 1; }
 };
 
+/// By what the contrasts of a sound craft's rotors (twist, two pairs; ln commands) differ from what is known of it: a
+/// Student's t each.
+struct SoundScatter {
+  Eigen::Array3d scale;
+  double degrees;
+};
+
 /// All flights of a study as rows of windows, in flight order.
 struct Observations {
   std::size_t flights = 0;
@@ -144,6 +151,7 @@ struct Observations {
   std::array<std::vector<double>, kChannels> y, weight;  ///< value, and inverse of its relative variance
   std::map<Gate, std::size_t, ByName> gated_out;         ///< windows by reason
   std::map<Source, std::string> missing;                 ///< what no flight had, and why: "no battery_v column"
+  std::optional<SoundScatter> sound_rotors;              ///< of reference flights; they are taken out of y
   bool has(Source what) const { return !missing.contains(what); }
   bool measured(Channel c) const;
   /// Units of neighbouring flights with the same value, one a flight.

@@ -131,11 +131,12 @@ struct Visitor {
     visit(lines);
   }
   void visit(Observations& seen) {
-    auto& [flights, windows, first, units, row_period, y, weight, gated_out, missing] = seen;
+    auto& [flights, windows, first, units, row_period, y, weight, gated_out, missing, sound_rotors] = seen;
     (*this)(flights, windows, first, row_period, y, weight);
     visit_as<std::pair<Gate, std::size_t>>(gated_out);
     static_cast<void>(units);
     static_cast<void>(missing);  // made when all flights are together
+    static_cast<void>(sound_rotors);
   }
 
  public:

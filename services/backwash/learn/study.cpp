@@ -6,6 +6,7 @@
 #include "core/study/findings/residuals.hpp"
 #include "core/study/findings/study_page.hpp"
 #include "core/study/inference/rotors/rotor_reference.hpp"
+#include "core/study/inference/rotors/sound_rotors.hpp"
 #include "core/study/windows/observer.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/learn/calibrate_input.hpp"
@@ -69,7 +70,7 @@ std::optional<study::RotorVerdict> against_reference(const StudyOptions& options
                                                      const std::optional<study::Observations>& sound,
                                                      const study::Observations& seen) {
   if (!sound) return std::nullopt;
-  auto verdict = study::judge_rotors(study::rotor_contrasts(*sound), study::rotor_contrasts(seen));
+  auto verdict = study::judge_rotors(study::rotor_shares(*sound), study::rotor_shares(seen));
   if (!verdict)
     throw Failure(kBadData,
                   options.reference.front() +

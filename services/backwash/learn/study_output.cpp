@@ -166,14 +166,16 @@ Json to_json(const study::Consequence& c) {
 
 Json to_json(const study::RotorVerdict& v) {
   Json set = Json::array();
-  for (const auto state : v.set) set.push_back(study::to_string(state));
+  for (const auto state : v.told.set) set.push_back(study::to_string(state));
+  const auto& need = v.told.each[v.told.rotor];
   return {{"verdict", study::to_string(v.kind)},
           {"set", std::move(set)},
-          {"rotor", v.rotor},
-          {"d", {{"value", v.d}, {"ci95", {v.low, v.high}}}},
+          {"rotor", v.told.rotor + 1},
+          {"d", {{"value", need.d}, {"ci95", {need.low, need.high}}}},
+          {"weight", {{"rotor", v.told.heavy + 1}, {"share", v.told.weight}}},
           {"minimum_detectable", {{"d", v.minimum}}},
-          {"t", {{"yaw", v.t_yaw}, {"pair_1_3", v.t_a}, {"pair_2_4", v.t_b}, {"damage", v.t_d}}},
-          {"needed", v.needed}};
+          {"t", {{"yaw", v.t[0]}, {"pair_1_3", v.t[1]}, {"pair_2_4", v.t[2]}}},
+          {"nats", {{"damage_over_sound", v.told.lead}, {"chance", v.told.needed}}}};
 }
 
 Json to_json(const study::calibrate::HeightEffects& effects) {
@@ -255,7 +257,8 @@ void print_text(const study::StudyResult& result, const study::Observations& see
   if (height && height->hovers) print_text("hovers", *height->hovers);
   if (rotors) {
     std::printf("rotors against the reference flights: %s\n", study::rotor_sentence(*rotors).c_str());
-    std::printf("  t of damage %.1f, needed %.1f; of yaw %.1f\n", rotors->t_d, rotors->needed, rotors->t_yaw);
+    std::printf("  damage over a sound craft %.1f nats, chance %.1f; t of the twist %.1f\n", rotors->told.lead,
+                rotors->told.needed, rotors->t[0]);
   }
 }
 

@@ -37,12 +37,6 @@ TEST(Distributions, StudentsQuantileHoldsItsShareOfTheDensity) {
   }
 }
 
-// With two degrees above, the tail of F is (1 + 2f/n)^(−n/2).
-TEST(Distributions, TheQuantileOfFWithTwoDegreesIsItsClosedForm) {
-  for (const double n : {3.0, 10.0, 50.0})
-    EXPECT_NEAR(std::pow(1 + 2 * f_quantile(0.95, 2, n) / n, -n / 2), 0.05, 1e-12);
-}
-
 TEST(Distributions, DigammaAndTrigammaAreTheDerivativesOfTheLogarithmOfGamma) {
   EXPECT_NEAR(digamma(1), -std::numbers::egamma, 1e-14);
   EXPECT_NEAR(trigamma(1), std::numbers::pi * std::numbers::pi / 6, 1e-14);

@@ -62,7 +62,6 @@ Effect payload() {
                  .scale_name = "pairing",
                  .scales = scales_of({0, 1, 2}),
                  .integer_scale = true,
-                 .motors_alone = true,
                  .constant = true,
                  .floor = 0.02,
                  .needs = {Source::motors},
@@ -70,7 +69,7 @@ Effect payload() {
                  .simulate = needed_of_rotors,
                  .meanings = {share_of_pair, share_of_pair}}},
       .remedy = [](auto& fitted, auto& v) {
-        if (fitted.form.motors_alone)
+        if (fitted.form.needs.front() == Source::motors)
           return with_craft("Move the weight, or the battery, towards the middle of the craft.");
         return in_vehicle({{"body.mass", v.body.mass, v.body.mass / (1 - fitted.theta[0])}});
       }};

@@ -37,7 +37,6 @@ Effect propeller_damage() {
                      .scale_name = "rotor",
                      .scales = rotors(),
                      .integer_scale = true,
-                     .motors_alone = true,
                      .constant = true,
                      .least = 0.04,
                      .one_sided = true,

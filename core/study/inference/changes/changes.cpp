@@ -10,6 +10,7 @@
 #include "core/study/inference/changes/acting.hpp"
 #include "core/study/inference/rivals.hpp"
 #include "core/study/inference/rotors/rotor_rules.hpp"
+#include "core/study/inference/rotors/sound_rotors.hpp"
 
 namespace backwash::study {
 namespace {
@@ -271,6 +272,20 @@ bool left_by(const std::vector<Change>& known, const Fitted& fitted) {
   });
 }
 
+/// What the rotors show in the windows of a change of their commands; nothing of another one.
+std::optional<RotorsTold> rotors_where(const Change& change, const Observations& seen) {
+  if (!rotor_state(*change.found.form)) return std::nullopt;
+  std::vector<double> amount;
+  for (const double x : change.found.columns.front().parts.front().x) amount.push_back(std::abs(x));
+  return rotors_of(seen, amount);
+}
+
+/// Whether it is no more than rotors of a sound craft differ by from session to session.
+bool of_sound_rotors(const Fitted& fitted, const Observations& seen) {
+  const auto told = rotors_where(fitted.changes.front(), seen);
+  return told && told->holds(RotorState::sound);
+}
+
 /// The lead over another, and the standard error of that sum.
 Lead lead_over(const Fitted& ours, const Fitted& theirs) {
   const double n = static_cast<double>(ours.nats.size());
@@ -298,20 +313,24 @@ std::vector<std::vector<Change>> likeliest_changes(const Evidence& evidence, con
   std::ranges::stable_sort(all, [](auto& a, auto& b) { return a.score > b.score; });
   std::vector<Fitted> best;  // of each cause
   for (auto& one : all)
-    if (std::ranges::none_of(best, [&](auto& b) { return b.effect() == one.effect(); })) best.push_back(std::move(one));
+    if (std::ranges::none_of(best, [&](auto& b) { return b.effect() == one.effect(); }) &&
+        !of_sound_rotors(one, evidence.seen()))
+      best.push_back(std::move(one));
   std::vector<std::vector<Change>> changes;
   for (std::size_t k = 0; k < best.size() && static_cast<double>(k) < kRules.most_causes; ++k) {
     std::vector<Rival> rivals;
     for (const auto& other : best) {
       if (&other == &best[k]) continue;
-      const Accepted& own = best[k].changes.front().found;
       const Accepted& theirs = other.changes.front().found;
       const Lead lead = lead_over(best[k], other);
-      if ((own.form->motors_alone && theirs.form->motors_alone) || lead.nats < needed_lead(lead.error, 0))
+      if (lead.nats < needed_lead(lead.error, 0))
         rivals.push_back({theirs.form->cause(), theirs.form, theirs.scale, lead.nats});
     }
     changes.push_back(best[k].changes);
-    for (auto& c : changes.back()) c.found.rivals = rivals;
+    for (auto& c : changes.back()) {
+      c.found.rivals = rivals;
+      if (const auto told = rotors_where(c, evidence.seen())) name_rotors(c.found, *told);
+    }
   }
   return changes;
 }

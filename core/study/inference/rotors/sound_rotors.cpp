@@ -6,133 +6,206 @@
 #include <numeric>
 
 #include "core/study/inference/rotors/rotor_rules.hpp"
+#include "core/study/windows/signals/distributions.hpp"
 
 namespace backwash::study {
 namespace {
 
-constexpr std::size_t kRotors = kLine4 - kLine1 + 1;
+/// Four channels over windows that measure all of them.
+struct Sums {
+  double windows = 0;
+  Eigen::Array4d value = Eigen::Array4d::Zero(), square = value;
 
-/// Mean of a channel over measured windows [begin, end); NaN without one.
-double mean(const Observations& seen, std::size_t channel, std::size_t begin, std::size_t end) {
-  double sum = 0, weight = 0;
-  for (std::size_t i = begin; i < end; ++i) {
-    sum += seen.weight[channel][i] * seen.y[channel][i];
-    weight += seen.weight[channel][i];
+  void add(const Observations& seen, std::size_t first, std::size_t i) {
+    Eigen::Array4d y;
+    for (std::size_t r = 0; r < 4; ++r) {
+      if (!(seen.weight[first + r][i] > 0)) return;
+      y[static_cast<Eigen::Index>(r)] = seen.y[first + r][i];
+    }
+    windows += 1;
+    value += y;
+    square += y.square();
   }
-  return sum / weight;
+  Eigen::Array4d mean() const { return value / windows; }
+  /// Variance of the mean of one channel, the four alike.
+  double error2() const { return windows > 1 ? (square / windows - mean().square()).mean() / (windows - 1) : 0; }
+};
+
+Sums sums_of(const Observations& seen, std::size_t first, std::size_t begin, std::size_t end) {
+  Sums sums;
+  for (std::size_t i = begin; i < end; ++i) sums.add(seen, first, i);
+  return sums;
 }
 
-/// Median of the flights' means of a channel, of two middle ones the nearer to the simulation: a fault in up to half of
-/// them does not move it. NaN without one.
+/// Median of the flights' means of a channel, of two middle ones the nearer to 0: a fault in up to half of them does
+/// not move it. NaN without one.
 double typical_level(const Observations& seen, std::size_t channel) {
   std::vector<double> all;
-  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f)
-    if (const double m = mean(seen, channel, seen.first[f], seen.first[f + 1]); std::isfinite(m)) all.push_back(m);
+  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
+    double sum = 0, weight = 0;
+    for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i) {
+      sum += seen.weight[channel][i] * seen.y[channel][i];
+      weight += seen.weight[channel][i];
+    }
+    if (weight > 0) all.push_back(sum / weight);
+  }
   if (all.empty()) return std::nan("");
   std::sort(all.begin(), all.end());
   const double below = all[(all.size() - 1) / 2], above = all[all.size() / 2];
   return std::abs(below) < std::abs(above) ? below : above;
 }
 
-/// Whether one rotor's line stands above the others' mean.
-bool shakes(const Observations& seen) {
-  std::array<double, kRotors> line{};
-  for (std::size_t r = 0; r < kRotors; ++r) line[r] = mean(seen, kLine1 + r, 0, seen.windows.size());
-  const double sum = std::accumulate(line.begin(), line.end(), 0.0);
-  return std::any_of(line.begin(), line.end(), [&](double l) { return l - (sum - l) / 3 > kRotorRules.shaking_line; });
+/// Of four channels; NaN where one is not measured.
+Eigen::Array4d typical_levels(const Observations& seen, std::size_t first) {
+  Eigen::Array4d levels;
+  for (std::size_t r = 0; r < 4; ++r) levels[static_cast<Eigen::Index>(r)] = typical_level(seen, first + r);
+  return levels;
+}
+
+std::vector<Eigen::Array4d> by_flight(const Observations& seen, std::size_t first) {
+  std::vector<Eigen::Array4d> all;
+  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f)
+    if (const Sums sums = sums_of(seen, first, seen.first[f], seen.first[f + 1]); sums.windows > 0)
+      all.push_back(sums.mean());
+  return all;
+}
+
+/// Contrasts of independent rotors that scatter by 1.
+const Contrasts kOfOne(0.5, std::sqrt(0.5), std::sqrt(0.5));
+/// By what those of one sound craft scatter between sessions.
+const Contrasts kSession(kRotorRules.session_twist, kRotorRules.session_pairs, kRotorRules.session_pairs);
+
+void take_out(const Eigen::Array4d& own, std::size_t first, Observations& seen) {
+  for (std::size_t r = 0; r < 4; ++r)
+    for (double& y : seen.y[first + r]) y -= own[static_cast<Eigen::Index>(r)];
+}
+
+RotorLevel level_of(const Eigen::Array4d& ln, const Eigen::Array4d& line, SoundScatter sound, double error2,
+                    const Observations& seen) {
+  sound.scale = (sound.scale.square() + error2 * kOfOne.square()).sqrt();
+  RotorLevel level{{ln - ln.mean()}, sound};
+  if (line.isFinite().all()) level.difference.line = line / kRotorRules.line_scatter.value;
+  if (!seen.sound_rotors) level.difference.pairings = kPairings;
+  return level;
+}
+
+/// Of all windows; nothing without motor commands.
+std::optional<RotorLevel> level_of(const Observations& seen) {
+  const Sums all = sums_of(seen, kMotor1, 0, seen.windows.size());
+  if (!(all.windows > 0)) return std::nullopt;
+  return level_of(typical_levels(seen, kMotor1), typical_levels(seen, kLine1),
+                  seen.sound_rotors.value_or(built_rotors()), all.error2(), seen);
 }
 
 }  // namespace
 
+Eigen::Array4d mean_of(const std::vector<Eigen::Array4d>& flights) {
+  Eigen::Array4d sum = Eigen::Array4d::Zero();
+  for (const auto& f : flights) sum += f / static_cast<double>(flights.size());
+  return sum;
+}
+
+std::vector<Eigen::Array4d> rotor_shares(const Observations& seen) { return by_flight(seen, kMotor1); }
+
 std::optional<SoundRotors> sound_rotors(const Observations& reference) {
-  std::vector<std::array<double, 8>> flights;
-  for (std::size_t f = 0; f + 1 < reference.first.size(); ++f) {
-    std::array<double, 8> one{};
-    for (std::size_t k = 0; k < one.size(); ++k)
-      one[k] = mean(reference, kMotor1 + k, reference.first[f], reference.first[f + 1]);
-    if (std::isfinite(one.front()) || std::isfinite(one[kRotors])) flights.push_back(one);
-  }
-  const double n = static_cast<double>(flights.size());
-  if (n < kRules.fewest_sound) return std::nullopt;
   SoundRotors sound;
-  double square = 0;
-  for (std::size_t k = 0; k < 2 * kRotors; ++k) {
-    for (const auto& f : flights) sound.mean[k] += f[k] / n;
-    for (const auto& f : flights) square += k < kRotors ? std::pow(f[k] - sound.mean[k], 2) : 0;
-    if (!std::isfinite(sound.mean[k])) sound.mean[k] = 0;
-  }
-  const double between = std::sqrt(square / (3 * (n - 1)));
-  sound.spread = std::max(kRules.motor_scatter.value, between * std::sqrt(1 + 1 / n));
+  sound.flights = rotor_shares(reference);
+  const auto rpm = by_flight(reference, kRpm1);
+  if (static_cast<double>(std::max(sound.flights.size(), rpm.size())) < kRules.fewest_sound) return std::nullopt;
+  sound.motor = mean_of(sound.flights);
+  sound.rpm = mean_of(rpm);
   return sound;
 }
 
+SoundScatter built_rotors() { return {kRotorRules.built_scatter * kOfOne, kRotorRules.session_degrees}; }
+
+SoundScatter scatter_of(const std::vector<Eigen::Array4d>& flights) {
+  const double n = static_cast<double>(flights.size()), prior = kRotorRules.session_degrees;
+  const Eigen::Array4d centre = mean_of(flights);
+  Contrasts square = prior * kSession.square();
+  for (const auto& f : flights) square += contrasts_of(f - centre, kPairings[0]).square();
+  const double degrees = n - 1 + prior;
+  return {(square / degrees * (1 + 1 / n)).sqrt(), degrees};
+}
+
+std::optional<RotorsTold> rotors_of(const Observations& seen) {
+  const auto level = level_of(seen);
+  return level ? std::optional(told_of(level->difference, level->sound)) : std::nullopt;
+}
+
+std::optional<RotorsTold> rotors_of(const Observations& seen, const std::vector<double>& amount) {
+  std::array<Sums, 2> motors;  // without it, with it
+  std::array<double, 2> sessions{};
+  std::array<std::array<double, 4>, 2> line{}, lines{};
+  for (std::size_t i = 0; i < amount.size(); ++i) {
+    const std::size_t k = amount[i] > 0 ? 1 : 0;
+    motors[k].add(seen, kMotor1, i);
+    if (i == 0 || (amount[i] > 0) != (amount[i - 1] > 0)) sessions[k] += 1;
+    for (std::size_t r = 0; r < 4; ++r) {
+      line[k][r] += seen.weight[kLine1 + r][i] * seen.y[kLine1 + r][i];
+      lines[k][r] += seen.weight[kLine1 + r][i];
+    }
+  }
+  if (!(motors[0].windows > 0 && motors[1].windows > 0)) return std::nullopt;
+  Eigen::Array4d shakes;
+  for (std::size_t r = 0; r < 4; ++r)
+    shakes[static_cast<Eigen::Index>(r)] = line[1][r] / lines[1][r] - line[0][r] / lines[0][r];
+  const double spread = std::sqrt(1 / sessions[0] + 1 / sessions[1]);
+  const RotorLevel level =
+      level_of(motors[1].mean() - motors[0].mean(), shakes, {spread * kSession, kRotorRules.session_degrees},
+               motors[0].error2() + motors[1].error2(), seen);
+  return told_of(level.difference, level.sound);
+}
+
+bool may_be_one_rotor(const RotorLevel& level, double lost) {
+  return level.maybe_damaged && lost > 0 && lost < 1 &&
+         may_need(level.difference.ln, std::log1p(4 * lost / (1 - lost)));
+}
+
+std::optional<RotorState> rotor_state(const Form& form) {
+  if (std::ranges::find(form.needs, Source::motors) == form.needs.end()) return std::nullopt;
+  if (form.effect->at_rotors == AtRotors::weight) return RotorState::payload;
+  if (form.effect->at_rotors == AtRotors::propeller) return RotorState::propeller_damage;
+  return std::nullopt;
+}
+
+void name_rotors(Accepted& cause, const RotorsTold& told) {
+  const auto own = rotor_state(*cause.form);
+  if (!own) return;
+  std::erase_if(cause.rivals, [](auto& r) { return rotor_state(*r.form).has_value(); });
+  for (const Form* form : catalogue()) {
+    const auto other = rotor_state(*form);
+    if (!other || other == own || (told.holds(*own) && !told.holds(*other))) continue;
+    cause.rivals.push_back({form->cause(), form, form->scales.front(), 0});
+    return;
+  }
+}
+
 SettledRotors settle_rotors(const std::optional<SoundRotors>& sound, Observations seen) {
-  double unjudged = 0;
-  const bool shaking = !sound && shakes(seen);
-  for (const std::size_t first : {std::size_t{kMotor1}, std::size_t{kRpm1}}) {
-    std::array<double, kRotors> own{};
-    double most = 0;
-    for (std::size_t r = 0; r < kRotors; ++r) {
-      own[r] = sound ? sound->mean[first - kMotor1 + r] : typical_level(seen, first + r);
-      if (!std::isfinite(own[r])) own[r] = 0;  // not measured
-      most = std::max(most, std::abs(own[r]));
-    }
-    // What a rotor's rpm² gives differs by as much as its command, and the channel holds both.
-    const double built = kRotorRules.rotor_spread * (first == kRpm1 ? std::sqrt(2.0) : 1.0);
-    if (!sound && (!(most <= kRotorRules.spread_limit * built) || (first == kMotor1 && shaking))) continue;
-    if (!sound) unjudged = std::max(unjudged, most);
-    for (std::size_t r = 0; r < kRotors; ++r)
-      for (double& y : seen.y[first + r]) y -= own[r];
+  if (sound) {
+    take_out(sound->motor, kMotor1, seen);
+    take_out(sound->rpm, kRpm1, seen);
+    if (!sound->flights.empty()) seen.sound_rotors = scatter_of(sound->flights);
   }
-  return {std::move(seen), unjudged > kRules.motor_scatter ? std::optional(unjudged) : std::nullopt};
-}
-
-bool YawBalance::weight() const { return std::abs(yaw) <= kRotorRules.balance_errors * error; }
-bool YawBalance::propeller() const { return std::abs(yaw - damage) <= kRotorRules.balance_errors * error; }
-
-YawBalance yaw_balance(const std::array<double, 4>& ln_thrust, double spread) {
-  std::array<double, kRotors> thrust{};
-  for (std::size_t r = 0; r < kRotors; ++r) thrust[r] = std::exp(ln_thrust[r]);
-  const double sum = std::accumulate(thrust.begin(), thrust.end(), 0.0);
-  std::sort(thrust.begin(), thrust.end());
-  // The largest and the least face each other. Four independent errors of which each counts by a quarter.
-  return {2 * (thrust[3] + thrust[0]) / sum - 1, spread / 2, (thrust[3] - (sum - thrust[3]) / 3) / sum};
-}
-
-Accepted name_by_balance(Accepted cause, const Observations& rest, bool taken_out, double spread) {
-  std::array<double, kRotors> ln{};
-  bool motors = false, own_line = false;
-  for (std::size_t k = 0; k < cause.columns.size(); ++k)
-    for (const auto& [channel, x, aside] : cause.columns[k].parts) {
-      motors = motors || (channel >= kMotor1 && channel <= kMotor4);
-      own_line = own_line || (channel >= kLine1 && channel <= kLine4 && cause.parameters[k].low > 0);
-    }
-  if (!motors || own_line) return cause;
-  double windows = 0;
-  for (std::size_t i = 0; i < rest.windows.size(); ++i) {
-    std::array<double, kRotors> added{};
-    bool acts = false;
-    for (std::size_t k = 0; k < cause.columns.size(); ++k)
-      for (const auto& [channel, x, aside] : cause.columns[k].parts)
-        if (channel >= kMotor1 && channel <= kMotor4) {
-          added[channel - kMotor1] += cause.theta[static_cast<Eigen::Index>(k)] * x[i];
-          acts = acts || x[i] != 0;
-        }
-    if (!acts || !(rest.weight[kMotor1][i] > 0)) continue;
-    windows += 1;
-    for (std::size_t r = 0; r < kRotors; ++r)
-      ln[r] += (rest.y[kMotor1 + r][i] + (taken_out ? added[r] : 0) - ln[r]) / windows;
+  SettledRotors settled;
+  settled.level = level_of(seen);
+  settled.seen = std::move(seen);
+  const auto leave_out = [&](std::size_t first) {
+    const Eigen::Array4d own = typical_levels(settled.seen, first);
+    take_out(own, first, settled.seen);
+    const double most = own.abs().maxCoeff();
+    if (!sound && most > kRules.motor_scatter) settled.unjudged = std::max(settled.unjudged, most);
+  };
+  if (settled.level) {
+    const RotorsTold told = told_of(settled.level->difference, settled.level->sound);
+    settled.level->maybe_damaged = !sound || told.holds(RotorState::propeller_damage);
+    if (told.holds(RotorState::sound)) leave_out(kMotor1);
   }
-  const YawBalance balance = yaw_balance(ln, spread);
-  const Form *propeller = nullptr, *weight = nullptr;
-  for (const Form* form : catalogue())
-    if (form->motors_alone) (form->effect->at_rotors == AtRotors::weight ? weight : propeller) = form;
-  const bool is_weight = cause.form->effect == weight->effect;
-  const bool sure = balance.weight() != balance.propeller() && balance.weight() == is_weight;
-  std::erase_if(cause.rivals, [&](auto& r) { return r.form->effect == propeller->effect || r.form == weight; });
-  const Form* other = is_weight ? propeller : weight;
-  if (!sure) cause.rivals.push_back({other->cause(), other, other->scales.front(), 0});
-  return cause;
+  // What a rotor's rpm² gives differs by as much as its command, and the channel holds both.
+  const double limit = std::sqrt(2.0) * kRotorRules.built_scatter *
+                       student_quantile(1 - kRules.rotor_level / 4, kRotorRules.session_degrees);
+  if (!sound && typical_levels(settled.seen, kRpm1).abs().maxCoeff() <= limit) leave_out(kRpm1);
+  return settled;
 }
 
 }  // namespace backwash::study

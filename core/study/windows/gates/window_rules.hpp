@@ -96,6 +96,7 @@ struct WindowRules {
   Rule least_folded{"least_folded", 0.75, "Hz", "derived: below, a block of 1 s holds no whole turn, and the line is as slow as a gust"};
   Rule from_half_rate{"from_half_rate", 1, "Hz", "derived: nearer to half the rate a line's neighbours are missing"};
   Rule dropout{"dropout", 0.3, "of the median rpm", "derived: a rotor that slow would lift 9 %: it is the reading that is wrong"};
+  Rule stuck_steps{"stuck_steps", 4, "steps of the log", "derived: rounding hides one of this rotor's and one of the others', noise as much again"};
   Rule least_motor{"least_motor", 1e-6, "of full thrust", "derived: so that its logarithm is finite"};
   Rule least_rpm{"least_rpm", 1, "rpm", "derived: so that its logarithm is finite"};
   // Flights that come twice

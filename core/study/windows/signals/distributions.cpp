@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/windows/signals/distributions.hpp"
 
-#include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <boost/math/special_functions/beta.hpp>
 #include <boost/math/special_functions/digamma.hpp>
@@ -23,10 +22,6 @@ double student_quantile(double p, double degrees) {
 
 double student_tail(double t, double degrees) {
   return cdf(complement(boost::math::students_t_distribution<double, Policy>(degrees), t));
-}
-
-double f_quantile(double p, double above, double below) {
-  return quantile(boost::math::fisher_f_distribution<double, Policy>(above, below), p);
 }
 
 double r2_tail(double r2, double explained, double left) {

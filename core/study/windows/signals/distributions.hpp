@@ -8,8 +8,6 @@ namespace backwash::study {
 double student_quantile(double p, double degrees);
 /// P(T > t) of Student's t with `degrees` of freedom.
 double student_tail(double t, double degrees);
-/// Quantile p of the F distribution with `above` and `below` degrees of freedom.
-double f_quantile(double p, double above, double below);
 /// P(R² > r2) where `explained` of all degrees of freedom are fitted to noise alone and `left` remain.
 double r2_tail(double r2, double explained, double left);
 /// ψ(x) = d ln Γ(x)/dx, and its derivative ψ'(x).

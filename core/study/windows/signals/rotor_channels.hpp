@@ -10,9 +10,12 @@
 
 namespace backwash::study {
 
-/// Phase of each rotor at every sample, rad: the integral of its rpm reading (median of three, so that a dropout does
-/// not turn it). Empty where the log has no such column.
-using RotorPhases = std::array<std::vector<double>, 4>;
+struct RotorPhases {
+  /// Of each rotor at every sample, rad: the integral of its rpm reading (median of three, so that a dropout does not
+  /// turn it). Empty where the log has no such column.
+  std::array<std::vector<double>, 4> phase;
+  std::array<double, 4> step{};  ///< in which its rpm was written down, the least difference of two rows
+};
 RotorPhases rotor_phases(const log::FlightLog& log, const Series& s);
 
 /// Lines, motor shares, rpm against command and dropouts of the rows [begin, end). `residual`: detrended vertical
