@@ -9,7 +9,6 @@
 #include "core/log/mcap/mcap_reader.hpp"
 #include "core/log/mcap/mcap_walk.hpp"
 #include "core/log/octets.hpp"
-#include "services/maps/content.hpp"
 #include "services/maps/frame_tree.hpp"
 #include "services/maps/geometry.hpp"
 #include "services/maps/scalars.hpp"
@@ -262,10 +261,8 @@ class Recording {
 
 }  // namespace
 
-Read read_recording(const std::string& path, const std::string& topic) {
-  const auto content = content_of(path, "an MCAP file");
-  if (!content) return tl::make_unexpected(content.error());
-  if (!log::is_mcap({reinterpret_cast<const std::uint8_t*>(content->data()), content->size()}))
+Read read_recording(const std::string& path, std::string_view content, const std::string& topic) {
+  if (!log::is_mcap({reinterpret_cast<const std::uint8_t*>(content.data()), content.size()}))
     return corrupt(path, ": does not begin as an MCAP file");
   Recording recording(topic);
   log::McapListener listener;
@@ -274,7 +271,7 @@ Read read_recording(const std::string& path, const std::string& topic) {
     return why.empty() ? why : channel.topic + ": " + why;
   };
   listener.unpack = unpacked;
-  const auto end = log::walk_mcap(*content, listener);
+  const auto end = log::walk_mcap(content, listener);
   const auto at = "byte " + std::to_string(end.at) + ": ";
   if (!end.wrong.empty()) return corrupt(path, ": " + at + end.wrong);
   auto geometry = recording.placed(path);

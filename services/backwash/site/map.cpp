@@ -84,7 +84,8 @@ int run(const MapVerbOptions& options) {
   if (count.free == 0)
     made.notes.push_back(
         "nothing is free: a vehicle can be nowhere; --free-from a place in the air, or --sensor of a scan");
-  write_file(options.out, map::octomap_file(made.grid), options.force);
+  write_file(options.out, map::octomap_file(made.grid), options.force,
+             [&](const std::string& written) { return lost_in(written, made, options.map.file); });
   options.json ? print_json(options, made, flooded) : print_text(options, made);
   return kOk;
 }

@@ -104,8 +104,6 @@ void add_mesh(const maps::Geometry& geometry, MadeMap& made) {
 }
 
 MadeMap from_geometry(const MapOptions& options) {
-  if (!options.topic.empty() && !options.file.ends_with(".mcap"))
-    throw Failure(kUsage, "--topic is of recordings; " + options.file + " is none");
   auto read = maps::read_geometry(options.file, options.topic);
   if (!read)
     throw Failure(read.error().kind == map::MapError::Kind::not_found ? kNoInput : kBadData, read.error().message);
@@ -142,18 +140,19 @@ MadeMap from_geometry(const MapOptions& options) {
     throw Failure(kUsage, "--sensor and --points-least are of clouds; " + options.file + " is a mesh");
   if (mesh) {
     add_mesh(geometry, made);
-    return made;
+  } else {
+    map::add_points(made.grid, geometry.points, options.points_least);
+    free_rays(options, geometry, made);
   }
-  map::add_points(made.grid, geometry.points, options.points_least);
-  free_rays(options, geometry, made);
+  made.from = std::move(geometry);
   return made;
 }
 
 }  // namespace
 
 MadeMap make_map(const MapOptions& options) {
-  const bool octomap =
-      options.file.starts_with("builtin:") || options.file.ends_with(".bt") || options.file.ends_with(".ot");
+  const bool named = options.file.ends_with(".bt") || options.file.ends_with(".ot");
+  const bool octomap = named || options.file.starts_with("builtin:") || maps::is_octomap(options.file);
   if (octomap && (!options.sensors.empty() || options.points_least > 1))
     throw Failure(kUsage, "--sensor and --points-least are of clouds; " + options.file + " is none");
   return octomap ? from_octomap(options) : from_geometry(options);
