@@ -37,11 +37,11 @@ struct Geometry {
 using Read = tl::expected<Geometry, map::MapError>;
 
 /// Reads a file by its content, and by the ending of its name where that does not tell: PLY, PCD, CSV, MCAP, OBJ, glTF
-/// or STL, also one that gzip made (but for glTF). `topic`: of a recording's clouds, where it holds others. What was
-/// read is held against the file's own count. Errors, with the file's name: not_found; unknown_name (another kind; of
-/// LAS, E57 and the like the command that makes a file for us); corrupt (line, byte or element, the value seen and what
-/// would be right); too_large.
-Read read_geometry(const std::string& path, const std::string& topic = "");
+/// or STL, also one that gzip made (but for a glTF that is a text). `topic`: of a recording's clouds, where it holds
+/// others; `body_radius` as in read_recording. What was read is held against the file's own count. Errors, with the
+/// file's name: not_found; unknown_name (another kind; of LAS, E57 and the like the command that makes a file for us);
+/// corrupt (line, byte or element, the value seen and what would be right); too_large.
+Read read_geometry(const std::string& path, const std::string& topic = "", double body_radius = 0);
 /// Whether a regular file begins as an OctoMap file does.
 bool is_octomap(const std::string& path);
 
@@ -52,10 +52,13 @@ Read read_ply(const std::string& path, std::string_view content);
 Read read_pcd(const std::string& path, std::string_view content);
 /// Columns x_m, y_m, z_m or x, y, z (m), with sensor_x_m, sensor_y_m, sensor_z_m for where each was seen from.
 Read read_point_csv(const std::string& path, std::string_view content);
-/// The PointCloud2 of one topic in an MCAP of ROS 2, in the frame that all others lead to by its TFMessage and, where
-/// none places a frame, its Odometry. Each point's sensor is where its cloud's frame was; of a cloud in that last frame
-/// itself, the body whose odometry was recorded. A cloud without a pose at its time is left out.
-Read read_recording(const std::string& path, std::string_view content, const std::string& topic);
+/// The clouds of one topic in an MCAP of ROS 2 (PointCloud2, Livox' CustomMsg), in the frame that all others lead to by
+/// its TFMessage and, where none places a frame, its Odometry. A frame that neither places is the body's whose poses
+/// name none (PoseStamped, VehicleOdometry, an Odometry of a frame in itself), or its clouds are refused: they would
+/// lie on each other. Each point's sensor is where its cloud's frame was; of a cloud in that last frame itself, the
+/// body whose odometry was recorded. Left out: a cloud without a pose at its time, points at their sensor (no returns)
+/// and those within `body_radius` (m) of the body, or of the sensor where no body is known: its own arms.
+Read read_recording(const std::string& path, std::string_view content, const std::string& topic, double body_radius);
 /// OBJ: v, f, l and p, in any order; texture and normals are not asked.
 Read read_obj(const std::string& path, std::string_view content);
 /// STL, whose count must be that of its bytes or words, and glTF by assimp in a process of its own: a damaged file ends

@@ -21,7 +21,7 @@ tl::expected<std::string, map::MapError> content_of(const std::string& path) {
       map::MapError{large ? Kind::too_large : Kind::not_found, path + ": " + content.error().message});
 }
 
-Read of_recording(const std::string& path, std::string_view content) { return read_recording(path, content, ""); }
+Read of_recording(const std::string& path, std::string_view content) { return read_recording(path, content, "", 0); }
 Read read_gltf(const std::string& path, std::string_view content) { return read_mesh(path, content, true); }
 Read read_stl(const std::string& path, std::string_view content) { return read_mesh(path, content, false); }
 
@@ -140,7 +140,7 @@ bool is_octomap(const std::string& path) {
          std::ifstream(path).read(begins.data(), static_cast<std::streamsize>(begins.size())) && begins == kBegins;
 }
 
-Read read_geometry(const std::string& path, const std::string& topic) {
+Read read_geometry(const std::string& path, const std::string& topic, double body_radius) {
   auto content = content_of(path);
   if (!content) return tl::make_unexpected(content.error());
   const bool zipped = content->starts_with("\x1f\x8b");
@@ -160,9 +160,10 @@ Read read_geometry(const std::string& path, const std::string& topic) {
   if (reader != std::end(kReaders)) {
     if (zipped && reader->read == read_gltf && !whole->starts_with("glTF"))
       return corrupt(path, ": is compressed by gzip; unpack it: gunzip -k " + path);
-    if (!topic.empty() && reader->read != of_recording)
-      return corrupt(path, ": --topic is of recordings, and it is none");
-    auto geometry = reader->read == of_recording ? read_recording(path, *whole, topic) : reader->read(path, *whole);
+    if ((!topic.empty() || body_radius > 0) && reader->read != of_recording)
+      return corrupt(path, ": --topic, --body-radius and --vehicle are of recordings, and it is none");
+    auto geometry =
+        reader->read == of_recording ? read_recording(path, *whole, topic, body_radius) : reader->read(path, *whole);
     return geometry ? checked(std::move(*geometry), path) : geometry;
   }
   const std::string known = "known are .bt, .ot, .ply, .pcd, .csv, .mcap, .obj, .gltf, .glb and .stl";

@@ -85,7 +85,12 @@ void free_rays(const MapOptions& options, const maps::Geometry& geometry, MadeMa
     if (!made.grid.inside(made.grid.index(sensor)))
       throw Failure(kUnavailable, options.file + ": a sensor at " + to_text(sensor) +
                                       " is outside the map; a wider --crop, or another place");
-  if (!sensors.empty()) made.freed = map::free_by_rays(made.grid, geometry.points, sensors);
+  if (sensors.empty()) return;
+  const auto through = map::free_by_rays(made.grid, geometry.points, sensors);
+  made.freed = through.unknown + through.occupied;
+  if (through.occupied > 0)
+    made.notes.push_back(std::to_string(through.occupied) +
+                         " voxels in which something had been are free: later scans saw through them");
 }
 
 void add_mesh(const maps::Geometry& geometry, MadeMap& made) {
@@ -104,7 +109,7 @@ void add_mesh(const maps::Geometry& geometry, MadeMap& made) {
 }
 
 MadeMap from_geometry(const MapOptions& options) {
-  auto read = maps::read_geometry(options.file, options.topic);
+  auto read = maps::read_geometry(options.file, options.topic, options.body_radius);
   if (!read)
     throw Failure(read.error().kind == map::MapError::Kind::not_found ? kNoInput : kBadData, read.error().message);
   maps::Geometry& geometry = *read;

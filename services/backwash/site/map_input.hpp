@@ -14,6 +14,7 @@ namespace backwash::services {
 struct MapOptions {
   std::string file, up;
   std::string topic;                        ///< of a recording's clouds; empty: it has one
+  double body_radius = 0;                   ///< m; of a recording: what is nearer to the vehicle is its own
   std::optional<double> resolution, scale;  ///< m; m per unit of the file
   map::Placement place;                     ///< its rotation is the one about W's axes, after `up`
   std::optional<std::pair<Vec3, Vec3>> crop;
