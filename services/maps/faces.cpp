@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "services/maps/faces.hpp"
-
 #include <Eigen/Geometry>
 #include <algorithm>
+
+#include "services/maps/geometry.hpp"
 
 namespace backwash::maps {
 namespace {
@@ -44,13 +44,9 @@ Triangles ears(const Corners& at) {
         return false;
     return true;
   };
-  for (std::size_t n = 0, missed = 0; ring.size() > 3 && missed < ring.size();) {
+  for (std::size_t n = 0, missed = 0; ring.size() > 3 && missed <= ring.size(); ++n, ++missed) {
     n %= ring.size();
-    if (!is_ear(n)) {
-      ++n;
-      ++missed;
-      continue;
-    }
+    if (!is_ear(n)) continue;
     found.push_back({ring[(n + ring.size() - 1) % ring.size()], ring[n], ring[(n + 1) % ring.size()]});
     ring.erase(ring.begin() + static_cast<std::ptrdiff_t>(n));
     missed = 0;
@@ -60,26 +56,18 @@ Triangles ears(const Corners& at) {
   return found;
 }
 
-/// All corners around the first.
-Triangles fan(std::size_t corners) {
-  Triangles all;
-  for (std::uint32_t n = 2; n < corners; ++n) all.push_back({0, n - 1, n});
-  return all;
-}
-
 }  // namespace
 
 void add_face(Geometry& geometry, std::span<const std::uint32_t> corners, std::size_t line) {
   const auto corner = [&](std::size_t n) { return corners[std::min(n, corners.size() - 1)]; };
-  Triangles parts = fan(std::max<std::size_t>(corners.size(), 3));
+  Triangles parts;  // a fan
+  for (std::uint32_t n = 2; n < std::max<std::size_t>(corners.size(), 3); ++n) parts.push_back({0, n - 1, n});
   if (corners.size() > 3) {
     const auto at = flat(geometry.points, corners);
-    const bool bulges = std::ranges::all_of(parts, [&](const auto& t) { return turn(at, t[0], t[1], t[2]) >= 0; });
-    if (!bulges) {
-      auto cut = corners.size() <= kMostEars ? ears(at) : Triangles();
-      geometry.fans += cut.empty();
-      if (!cut.empty()) parts = std::move(cut);
-    }
+    const bool once = std::ranges::all_of(parts, [&](const auto& t) { return turn(at, t[0], t[1], t[2]) >= 0; });
+    auto cut = once || corners.size() > kMostEars ? Triangles() : ears(at);
+    geometry.fans += !once && cut.empty();
+    if (!cut.empty()) parts = std::move(cut);
   }
   for (const auto& t : parts) {
     geometry.triangles.push_back({corner(t[0]), corner(t[1]), corner(t[2])});

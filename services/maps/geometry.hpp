@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -64,6 +65,12 @@ Read read_obj(const std::string& path, std::string_view content);
 /// STL, whose count must be that of its bytes or words, and glTF by assimp in a process of its own: a damaged file ends
 /// that, or its time, and not the caller.
 Read read_mesh(const std::string& path, std::string_view content, bool gltf);
+
+/// Adds a face of the file as triangles: a corner is a place, two are a line, and what has more is cut into ears. Where
+/// it crosses itself, or has no plane, it is a fan around its first corner, which covers all of it and maybe more: that
+/// is counted in `fans`. `line` is where the file says it, or 0. Precondition: the corners are in geometry.points.
+/// O(corners²), seldom O(corners³).
+void add_face(Geometry& geometry, std::span<const std::uint32_t> corners, std::size_t line);
 
 /// An error of a file; `where` is empty, ":LINE" or what else follows its name.
 tl::unexpected<map::MapError> corrupt(const std::string& path, const std::string& what);

@@ -2,14 +2,13 @@
 // assimp 5.2.5 lets faces with texture coordinates vanish where the file has none before them; places alone are read
 // here.
 #include <algorithm>
+#include <span>
 
-#include "services/maps/faces.hpp"
+#include "services/maps/geometry.hpp"
 #include "services/maps/scalars.hpp"
 
 namespace backwash::maps {
 namespace {
-
-constexpr std::size_t kMostCorners = 1 << 20;  // of a face
 
 /// A statement's line, of which a backslash at its end makes one with the next; without its comment.
 class Statements {
@@ -50,44 +49,24 @@ std::string take_place(std::string_view words, Geometry& geometry) {
   return "";
 }
 
-/// What a face names is the vertex before the first slash: from 1 on, or back from the last one before it. The corners,
-/// or what is wrong.
-tl::expected<std::vector<std::int64_t>, std::string> corners_of(std::string_view words, std::size_t before) {
-  std::vector<std::int64_t> corners;
+/// Takes a face, the parts of a line, or points in; what is wrong, or nothing. What each word names is the vertex
+/// before its first slash: from 1 on, or back from the last of the `before` ones.
+std::string take_element(char kind, std::string_view words, std::size_t before, std::size_t line, Geometry& geometry) {
+  std::vector<std::uint32_t> corners;
   for (auto word = take_word(words); !word.empty(); word = take_word(words)) {
     const auto index = word.substr(0, word.find('/'));
     const bool back = index.starts_with('-');
-    const auto number = count_of(index.substr(back));
-    if (!number || *number == 0 || *number > (back ? before : kMostPoints))
-      return tl::make_unexpected(shown(word) + " names no vertex; " + std::to_string(before) + " are before it");
-    const auto place = static_cast<std::int64_t>(*number);
-    corners.push_back(back ? static_cast<std::int64_t>(before) - place : place - 1);
-    if (corners.size() > kMostCorners) return tl::make_unexpected("a face of too many corners");
+    const auto number = count_of(index.substr(back)).value_or(0), most = back ? before : geometry.points.size();
+    if (number == 0 || number > most) return shown(word) + " names none of " + std::to_string(most) + " vertices";
+    corners.push_back(static_cast<std::uint32_t>(back ? before - number : number - 1));
   }
-  return corners;
-}
-
-/// Faces wait for vertices that come behind them.
-struct Waiting {
-  std::vector<std::int64_t> corners;
-  std::vector<std::pair<std::size_t, std::size_t>> ends;  // of each, with its line
-};
-
-/// What is wrong with a face, a line or points, or nothing.
-std::string take_element(char kind, std::string_view words, std::size_t line, const Geometry& geometry,
-                         Waiting& waiting) {
-  const auto corners = corners_of(words, geometry.points.size());
-  if (!corners) return corners.error();
-  const std::size_t count = corners->size(), least = kind == 'f' ? 3 : kind == 'l' ? 2 : 1;
-  if (count < least)
-    return std::string(1, kind) + " of " + std::to_string(count) + " corners, of which it has " + std::to_string(least);
-  const std::size_t each = kind == 'f' ? count : kind == 'l' ? 2 : 1;  // a line is its parts
-  for (std::size_t n = 0; n + each <= count; ++n) {
-    waiting.corners.insert(waiting.corners.end(), corners->begin() + static_cast<std::ptrdiff_t>(n),
-                           corners->begin() + static_cast<std::ptrdiff_t>(n + each));
-    waiting.ends.emplace_back(waiting.corners.size(), line);
-  }
-  return waiting.corners.size() > kMostPoints ? "too many corners of faces" : "";
+  const std::size_t count = corners.size(), least = kind == 'f' ? 3 : kind == 'l' ? 2 : 1;
+  if (count < least || geometry.triangles.size() + count > kMostPoints)
+    return std::string(1, kind) + " of " + std::to_string(count) + " corners, at least " + std::to_string(least);
+  const std::size_t each = kind == 'f' ? count : least;
+  for (std::size_t n = 0; n + each <= count; ++n) add_face(geometry, std::span(corners).subspan(n, each), line);
+  geometry.taken += kind == 'f';
+  return "";
 }
 
 /// Faces that the text says, by the first words of its lines alone.
@@ -106,35 +85,21 @@ std::size_t faces_in(std::string_view text) {
 
 Read read_obj(const std::string& path, std::string_view text) {
   Geometry geometry;
-  Waiting waiting;
-  Statements statements(text);
-  const auto wrong = [&](std::size_t line, const std::string& what) {
-    return corrupt(path, ":" + std::to_string(line) + ": " + what);
-  };
-  while (statements.next()) {
-    auto words = statements.words();
-    const auto what = take_word(words);
-    std::string why;
-    if (what == "v") why = take_place(words, geometry);
-    if (what == "f" || what == "l" || what == "p")
-      why = take_element(what[0], words, statements.line(), geometry, waiting);
-    if (what == "curv" || what == "surf" || what == "curv2" || what == "call")
-      why = shown(what) + " is not read; export it as faces in one file";
-    if (!why.empty()) return wrong(statements.line(), why);
-    if (geometry.points.size() > kMostPoints) return too_large(path, geometry.points.size());
-  }
-  std::size_t begin = 0;
-  std::vector<std::uint32_t> face;
-  for (const auto& [end, line] : waiting.ends) {
-    face.clear();
-    for (; begin < end; ++begin) {
-      if (static_cast<std::size_t>(waiting.corners[begin]) >= geometry.points.size())
-        return wrong(line, "names vertex " + std::to_string(waiting.corners[begin] + 1) + " of " +
-                               std::to_string(geometry.points.size()));
-      face.push_back(static_cast<std::uint32_t>(waiting.corners[begin]));
+  for (const bool places : {true, false}) {  // faces may be before their vertices
+    std::size_t before = 0;
+    for (Statements statements(text); statements.next();) {
+      auto words = statements.words();
+      const auto what = take_word(words);
+      std::string why;
+      before += what == "v";
+      if (places && what == "v") why = take_place(words, geometry);
+      if (!places && (what == "f" || what == "l" || what == "p"))
+        why = take_element(what[0], words, before, statements.line(), geometry);
+      if (what == "curv" || what == "surf" || what == "curv2" || what == "call")
+        why = shown(what) + " is not read; export it as faces in one file";
+      if (!why.empty()) return corrupt(path, ":" + std::to_string(statements.line()) + ": " + why);
+      if (before > kMostPoints) return too_large(path, before);
     }
-    add_face(geometry, face, line);
-    geometry.taken += face.size() > 2;
   }
   geometry.stated = faces_in(text);
   if (geometry.triangles.empty()) return corrupt(path, ": holds no face; a cloud is written as PLY");

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <map>
 
-#include "services/maps/faces.hpp"
+#include "services/maps/geometry.hpp"
 #include "services/maps/scalars.hpp"
 
 namespace backwash::maps {

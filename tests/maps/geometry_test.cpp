@@ -136,7 +136,7 @@ TEST_F(Geometries, OfAGltfAreAsManyAsItsNodesShow) {
 }
 
 TEST_F(Geometries, RefuseMeshesThatAreDamagedOrEmpty) {
-  refused("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", ":4: names vertex 9 of 3");
+  refused("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", ":4: '9' names none of 3 vertices");
   refused("b.obj", "", "holds no face");
   refused("c.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "holds no face");
   refused("d.stl", stl().substr(0, 200), "its head says 4 facets, and it has 200 bytes");

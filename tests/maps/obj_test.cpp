@@ -38,10 +38,10 @@ TEST_F(Obj, HasEveryFaceHoweverItIsWritten) {
   EXPECT_EQ(thin->triangles.size(), 6u);
   EXPECT_EQ(thin->lines, (std::vector<std::uint32_t>{5, 6, 7, 7, 8, 8}));
   EXPECT_EQ(thin->notes.at(0), "5 triangles have no area: they are lines or points of the map");
-  refused("c.obj", v + "f 1 2\n", ":5: f of 2 corners");
-  refused("c.obj", v + "f 1 2 0\n", ":5: '0' names no vertex");
-  refused("c.obj", v + "f 1 2 -5\n", ":5: '-5' names no vertex; 4 are before it");
-  refused("c.obj", v + "f 1 2 x\n", ":5: 'x' names no vertex");
+  refused("c.obj", v + "f 1 2\n", ":5: f of 2 corners, at least 3");
+  refused("c.obj", v + "f 1 2 0\n", ":5: '0' names none of 4 vertices");
+  refused("c.obj", v + "f 1 2 -5\n", ":5: '-5' names none of 4 vertices");
+  refused("c.obj", v + "f 1 2 x\n", ":5: 'x' names none of 4 vertices");
   refused("c.obj", "v 0 0 0 2\n", ":1: a vertex with a weight");
   refused("c.obj", "v 0 0\n", ":1: a vertex has x, y and z");
   refused("c.obj", v + "f 1 2 3\nsurf 0 1 0 1 1 2 3\n", ":6: 'surf' is not read");

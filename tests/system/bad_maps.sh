@@ -57,7 +57,7 @@ convert 66 "fifo.ply: is a FIFO; needs a mesh, a cloud or a recording" fifo.ply
 convert 66 "builtin:nowhere" builtin:nowhere
 refused 66 "absent.bt" info absent.bt
 convert 65 "pdal translate room.las room.ply" room.las
-convert 65 "indices.obj:4: names vertex 9 of 3" indices.obj
+convert 65 "indices.obj:4: '9' names none of 3 vertices" indices.obj
 convert 65 "short.ply:10: ends too early in vertex 3 of 3" short.ply
 convert 65 "short.bt" short.bt
 refused 65 "short.bt" info short.bt

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <cmath>
-
 #include "core/map/load_map.hpp"
 #include "services/backwash/site/map_input.hpp"
 #include "services/backwash/verb.hpp"
@@ -8,17 +6,12 @@
 namespace backwash::services {
 namespace {
 
-constexpr std::size_t kPlaces = 16;           // of a triangle
-constexpr std::size_t kMostPlaces = 1 << 25;  // of all of them, some 3 s; each triangle has three
-
-/// Place n on a triangle: its middle, its corners, then evenly in it (M. Roberts' sequence R2, folded).
-Vec3 place_on(const Vec3& a, const Vec3& b, const Vec3& c, std::size_t n) {
-  constexpr double kFirst = 0.7548776662466927, kSecond = 0.5698402909980532;  // 1/g, 1/g², g³ = g + 1
-  if (n == 0) return (a + b + c) / 3;
-  if (n <= 3) return n == 1 ? a : n == 2 ? b : c;
-  double u = std::fmod(kFirst * static_cast<double>(n), 1), v = std::fmod(kSecond * static_cast<double>(n), 1);
-  if (u + v > 1) u = 1 - u, v = 1 - v;
-  return a + u * (b - a) + v * (c - a);
+/// Shares of a triangle's corners at `n` places along its sides and as many within; its corners are among them.
+std::vector<Vec3> places_on_triangle(int n) {
+  std::vector<Vec3> shares;
+  for (int a = 0; a <= n; ++a)
+    for (int b = 0; a + b <= n; ++b) shares.push_back(Vec3(a, b, n - a - b) / n);
+  return shares;
 }
 
 }  // namespace
@@ -31,10 +24,12 @@ std::string lost_in(const std::string& written, const MadeMap& made, const std::
     if (const Index3 v = made.grid.voxel(n); read->at(first + v) != made.grid.at(n))
       return "the voxel at " + to_text(made.grid.center(v)) + " is read back otherwise than it was made";
   const auto& [points, triangles] = std::tie(made.from.points, made.from.triangles);
-  const std::size_t each = triangles.size() * kPlaces > kMostPlaces ? 3 : kPlaces;
+  constexpr std::size_t kMany = 1 << 21;  // of them the corners alone, some seconds
+  const auto shares = places_on_triangle(triangles.size() > kMany ? 1 : 5);
   for (std::size_t t = 0; t < triangles.size(); ++t)
-    for (std::size_t n = 0; n < each; ++n) {
-      const Vec3 at = place_on(points[triangles[t][0]], points[triangles[t][1]], points[triangles[t][2]], n);
+    for (const Vec3& share : shares) {
+      const auto& [a, b, c] = triangles[t];
+      const Vec3 at = share[0] * points[a] + share[1] * points[b] + share[2] * points[c];
       if (!made.grid.inside(made.grid.index(at)) || read->occupied(read->index(at))) continue;
       const std::size_t line = t < made.from.lines.size() ? made.from.lines[t] : 0;
       return "lacks triangle " + std::to_string(t + 1) + " of " + source +
