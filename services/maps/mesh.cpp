@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
+#include <cctype>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
@@ -105,17 +106,21 @@ tl::expected<std::size_t, std::string> facets_of(std::string_view content) {
   std::uint32_t said = 0;
   if (content.size() >= kHead) std::memcpy(&said, content.data() + kShown, sizeof said);
   if (content.size() == kHead + kFacet * said) return said;
-  std::size_t opened = 0, closed = 0;
+  std::size_t opened = 0, closed = 0, corners = 0;
   for (auto rest = content; content.starts_with("solid") && !rest.empty();) {
     auto line = take_line(rest);
     const auto word = take_word(line);
-    opened += word == "facet";
-    closed += word == "endfacet";
+    const auto is = [&](std::string_view other) {
+      return std::ranges::equal(word, other, [](unsigned char a, char b) { return std::tolower(a) == b; });
+    };
+    opened += is("facet");
+    closed += is("endfacet");
+    corners += is("vertex");
   }
-  if (closed > 0 && opened == closed) return opened;
+  if (closed > 0 && opened == closed && corners == 3 * closed) return opened;
   return tl::make_unexpected("STL: its head says " + std::to_string(said) + " facets, and it has " +
-                             std::to_string(content.size()) + " bytes, " + std::to_string(opened) +
-                             " words 'facet' and " + std::to_string(closed) + " 'endfacet'");
+                             std::to_string(content.size()) + " bytes, " + std::to_string(opened) + " 'facet', " +
+                             std::to_string(closed) + " 'endfacet' and " + std::to_string(corners) + " 'vertex'");
 }
 
 /// The faces that a scene's nodes show, by the counts of its accessors (glTF 2.0, 3.7.2): each mesh as often as a node

@@ -82,7 +82,8 @@ class Recording {
     for (const auto& one : poses) {
       bad_poses_ += !one.pose;
       if (!one.pose) continue;
-      parents_.insert(one.parent);
+      const bool always = m.topic.ends_with("tf_static");
+      if (!always) parents_.insert(one.parent);
       if (m.type != "tf2_msgs/msg/TFMessage") {
         const bool named = !one.child.empty();
         (named ? named_ : nameless_).insert(named ? one.child : m.topic);
@@ -90,7 +91,6 @@ class Recording {
         continue;
       }
       transforms_.insert(one.child);
-      const bool always = m.topic.ends_with("tf_static");
       if (auto why = tree_.add(one.parent, one.child, one.stamp_ns, *one.pose, always); !why.empty()) return why;
     }
     return "";
@@ -105,15 +105,16 @@ class Recording {
   /// A frame that nothing places goes along with the body that has no name; what is wrong, or nothing. Clouds of one
   /// that may have moved would lie on each other.
   std::string carry(const std::string& root) {
-    const bool fixed = parents_.contains(root) || std::ranges::count(kFixed, root) > 0 || clouds_.size() < 2;
-    if (root.empty() || fixed) return "";
+    const auto name = root.substr(root.rfind('/') + 1);  // without the vehicle's
+    const bool body_frame = name.starts_with("base_");   // REP 105's, whatever joint moves in it
+    const bool fixed = std::ranges::count(kFixed, name) > 0 || (parents_.contains(root) && !body_frame);
+    if (root.empty() || fixed || clouds_.size() < 2) return "";
     if (nameless_.size() != 1)
       return "nothing says where frame " + shown(root) +
-             " was: its clouds would lie on each other; record TFMessage, " + "Odometry or one PoseStamped" +
+             " was: its clouds would lie on each other; record TFMessage, Odometry or one PoseStamped" +
              (nameless_.empty() ? "" : ", and not several");
     const std::string body = *nameless_.begin();
     out_.notes.push_back("the poses of " + body + ", which name no body, are those of frame " + shown(root));
-    parents_.insert(root);
     return tree_.add(body, root, 0, {}, true);
   }
 
@@ -131,6 +132,7 @@ class Recording {
     const auto sensor = knows ? tree_.pose(seer, cloud.stamp_ns) : std::nullopt;
     if (!frame || (knows && !sensor)) {
       ++left_out_;
+      out_.taken += cloud.points.size();  // and told
       return "";
     }
     rays_ = rays_ && knows;
@@ -149,6 +151,8 @@ class Recording {
   }
 
   Geometry finished() {
+    out_.stated = count_;
+    out_.taken += out_.points.size() + out_.no_returns + own_;
     if (!rays_) {
       out_.sensors.clear();
       out_.notes.push_back("the clouds are in " + shown(root_) +

@@ -143,7 +143,13 @@ TEST_F(Geometries, RefuseMeshesThatAreDamagedOrEmpty) {
   refused("d.stl", stl() + stl().substr(84, 50), "and it has 334 bytes");
   refused("d.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\nendfacet\n", "");
   refused("d.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n",
-          "1 words 'facet' and 0 'endfacet'");
+          "1 'facet', 0 'endfacet' and 3 'vertex'");
+  const std::string corners = "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n";
+  refused("d.stl", "solid a\nfacet\n" + corners + "vertex 1 1 0\nendfacet\nendsolid\n", "and 4 'vertex'");
+  // assimp passes over words in capitals: the count tells.
+  const std::string loop = " normal 0 0 1\nouter loop\n" + corners + "endloop\n";
+  refused("d.stl", "solid a\nFACET" + loop + "ENDFACET\nfacet" + loop + "endfacet\nendsolid\n",
+          "says 2 faces or points, of which 1 were read");
   refused("e.glb", glb().substr(0, 300), "export it again");
   refused("f.gltf", "{", "export it again");
   refused("g.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", "no finite place");

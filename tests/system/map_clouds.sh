@@ -89,6 +89,15 @@ two = lambda made, t, at, yaw: [made.pose_stamped(t, at, yaw, topic) for topic i
 assert "and not several" in convert(recorded("two", two, cloud), code=65)
 other = lambda made, t, at, yaw: made.odometry(t, at, yaw, child="base_link")
 assert "nothing says where frame 'body' was" in convert(recorded("other", other, cloud), code=65)
+mount = lambda made: made.transform(0, "base_link", "body", (0, 0, 0), 0, "/tf_static")
+mounted = lambda made, t, at, yaw: mount(made)
+assert "nothing says where frame 'base_link' was" in convert(recorded("mounted", mounted, cloud), code=65)
+joint = lambda made, t, at, yaw: made.transform(t, "base_link", "body", (0, 0, 0), 0)
+assert "nothing says where frame 'base_link' was" in convert(recorded("joint", joint, cloud), code=65)
+both = lambda made, t, at, yaw: (mount(made), made.pose_stamped(t, at, yaw))
+assert convert(recorded("both", both, cloud))[1] == room
+moved = lambda made, t, at, yaw: (mount(made), made.transform(t, "quad/odom", "base_link", at, yaw))
+assert convert(recorded("moved", moved, cloud))[1] == room
 still = lambda p, at, yaw: p
 made, _ = convert(recorded("fixed", silent, lambda made, t, points: made.cloud(t, points, "map"), frame=still))
 told(made, "nothing says where they were seen from")

@@ -55,6 +55,9 @@ class Recording:
         cdr = Cdr().header(t, frame).text(child).pose(p, yaw).put("d", *[0] * 36, *[0] * 6, *[0] * 36)
         self.say(topic, "nav_msgs/msg/Odometry", cdr, t)
 
+    def transform(self, t, parent, child, p, yaw, topic="/tf"):
+        self.say(topic, "tf2_msgs/msg/TFMessage", Cdr().put("I", 1).header(t, parent).text(child).pose(p, yaw), t)
+
     def pose_stamped(self, t, p, yaw, topic="/mavros/local_position/pose", frame="map"):
         self.say(topic, "geometry_msgs/msg/PoseStamped", Cdr().header(t, frame).pose(p, yaw), t)
 

@@ -147,10 +147,10 @@ Command& add_convert(Command& group, const std::shared_ptr<MapVerbOptions>& opti
       .add_text("--sensor", points_to(options->map.sensors, "--sensor"),
                 "a cloud: where it was seen from; the rays to its points are free, m")
       .type_name("X,Y,Z");
-  command.add_option("--topic", options->map.topic, "a recording: its clouds, where it holds those of several topics");
-  command.add_option("--body-radius", options->body_radius, "a recording: points nearer to the vehicle are its own, m")
+  command.add_option("--topic", options->map.topic, "a recording: of its clouds, where it has several");
+  command.add_option("--body-radius", options->body_radius, "a recording: points so near are the vehicle's own, m")
       .check(positive());
-  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME, whose radius is --body-radius");
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME with that radius");
   command.add_option("--points-least", options->map.points_least, "a cloud: points that make a voxel occupied")
       .check(within(1, 65535))
       .capture_default_str();
