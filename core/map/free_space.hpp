@@ -20,10 +20,16 @@ struct Flood {
 /// Precondition: each seed is inside the grid and not occupied. O(cells).
 Flood flood_free(OccupancyGrid& grid, std::span<const Index3> seeds);
 
+/// Voxels that rays made free: what they held before.
+struct SeenThrough {
+  std::size_t unknown = 0, occupied = 0;
+};
+
 /// Makes every unknown voxel free that a ray from the sensor to a point passes (m, W); the point's own voxel is not
-/// passed, and what lies outside the grid is not asked. `sensors_W`: one for all points, or one each, where successive
-/// equal ones are a scan. Occupied voxels stay. Returns how many became free. Precondition: sensors inside the grid,
-/// rays shorter than 1 km. O(points · range/a).
-std::size_t free_by_rays(OccupancyGrid& grid, std::span<const Vec3> points_W, std::span<const Vec3> sensors_W);
+/// passed, and what lies outside the grid is not asked. An occupied one becomes free where LiveMap frees it: later
+/// scans have seen through it, so that who walked by is no wall. `sensors_W`: one for all points, or one each, where
+/// successive equal ones are a scan. Precondition: sensors inside the grid, rays shorter than 1 km. O(points ·
+/// range/a).
+SeenThrough free_by_rays(OccupancyGrid& grid, std::span<const Vec3> points_W, std::span<const Vec3> sensors_W);
 
 }  // namespace backwash::map

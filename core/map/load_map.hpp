@@ -15,10 +15,11 @@ struct MapError {
   std::string message;
 };
 
-/// Reads an OctoMap `.bt` or `.ot` file (type OcTree) into a grid over the tree's known extent, at the tree's finest
-/// resolution. A leaf is occupied from p = 0.5 (OcTree's default threshold; the files carry none), otherwise free; what
-/// the tree does not know is unknown. Errors: not_found, corrupt (wrong magic, truncated, empty tree …), too_large
-/// (file or decoded size above `max_bytes`, checked before anything of that size is allocated).
+/// Reads an OctoMap `.bt` or `.ot` file (OcTree, ColorOcTree or OcTreeStamped) into a grid over the tree's known
+/// extent, at the tree's finest resolution. A leaf is occupied from p = 0.5 (OcTree's default threshold; the files
+/// carry none), otherwise free; what the tree does not know is unknown. Errors: not_found, corrupt (wrong magic,
+/// truncated, empty tree …), too_large (file or decoded size above `max_bytes`, checked before anything of that size is
+/// allocated).
 tl::expected<OccupancyGrid, MapError> load_octomap(const std::string& path, std::size_t max_bytes = 512u << 20);
 
 /// One of the built-in worlds: parallel-walls-4m, -2m, -1m, narrow-gap, corridors, apartment, thin-wall,

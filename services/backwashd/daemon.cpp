@@ -110,7 +110,8 @@ struct Flight {
         front(made(
             kSystem,
             [&] { return std::make_unique<DdsFront>(s.daemon, reader_priority(s.daemon), s.vehicle, *channels); })),
-        maps(made(kSystem, [&] { return std::make_unique<MapFront>(s.daemon, *channels, *recorder); })),
+        maps(made(kSystem,
+                  [&] { return std::make_unique<MapFront>(s.daemon, s.vehicle.body.radius, *channels, *recorder); })),
         mission(s.vehicle),
         loop(*channels, link, s.vehicle, s.daemon.control.battery_land, s.daemon.map, s.daemon.odometry.timing, air) {
     link.pace(configured_line(s.daemon.link, s.daemon.odometry.timing).value());

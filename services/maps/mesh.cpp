@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
+#include <cctype>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
-#include "services/maps/content.hpp"
 #include "services/maps/geometry.hpp"
 #include "services/maps/in_child.hpp"
+#include "services/maps/scalars.hpp"
 
 namespace backwash::maps {
 namespace {
@@ -46,9 +48,13 @@ std::string take_faces(const aiMesh& mesh, std::uint32_t before, Faces& faces) {
   return "";
 }
 
-void import(const std::string& path, const Sink& sink) {
+/// A glTF that is a text may name files beside it.
+void import(const std::string& path, std::string_view content, bool gltf, const Sink& sink) {
+  constexpr unsigned kFlags = aiProcess_PreTransformVertices | aiProcess_Triangulate;
   Assimp::Importer importer;
-  const aiScene* const scene = importer.ReadFile(path, aiProcess_PreTransformVertices | aiProcess_Triangulate);
+  const char* const kind = !gltf ? "stl" : content.starts_with("glTF") ? "glb" : nullptr;
+  const aiScene* const scene = kind ? importer.ReadFileFromMemory(content.data(), content.size(), kFlags, kind)
+                                    : importer.ReadFile(path, kFlags);
   if (!scene) return put_error(sink, importer.GetErrorString());
   if (scene->mFlags & AI_SCENE_FLAGS_INCOMPLETE) return put_error(sink, "the scene is incomplete");
   std::uint64_t corners = 0;
@@ -85,17 +91,81 @@ std::string one_line(std::string text) {
   return text.substr(0, 300);
 }
 
+/// Triangles, lines and points of a primitive of `corners` corners, by its mode.
+std::size_t faces_of(std::size_t corners, int mode) {
+  constexpr int kPoints = 0, kLines = 1, kLoop = 2, kTriangles = 4;
+  if (mode == kPoints || mode == kLoop) return corners;
+  if (mode == kLines || mode == kTriangles) return corners / (mode == kLines ? 2 : 3);
+  const std::size_t before = mode < kTriangles ? 1 : 2;  // of a strip or a fan
+  return corners - std::min(corners, before);
+}
+
+/// The facets of an STL: by its head, which its size must bear out, or by its words.
+tl::expected<std::size_t, std::string> facets_of(std::string_view content) {
+  constexpr std::size_t kHead = 84, kFacet = 50, kShown = 80;  // bytes: before the facets, of each, before their count
+  std::uint32_t said = 0;
+  if (content.size() >= kHead) std::memcpy(&said, content.data() + kShown, sizeof said);
+  if (content.size() == kHead + kFacet * said) return said;
+  std::size_t opened = 0, closed = 0, corners = 0;
+  for (auto rest = content; content.starts_with("solid") && !rest.empty();) {
+    auto line = take_line(rest);
+    const auto word = take_word(line);
+    const auto is = [&](std::string_view other) {
+      return std::ranges::equal(word, other, [](unsigned char a, char b) { return std::tolower(a) == b; });
+    };
+    opened += is("facet");
+    closed += is("endfacet");
+    corners += is("vertex");
+  }
+  if (closed > 0 && opened == closed && corners == 3 * closed) return opened;
+  return tl::make_unexpected("STL: its head says " + std::to_string(said) + " facets, and it has " +
+                             std::to_string(content.size()) + " bytes, " + std::to_string(opened) + " 'facet', " +
+                             std::to_string(closed) + " 'endfacet' and " + std::to_string(corners) + " 'vertex'");
+}
+
+/// The faces that a scene's nodes show, by the counts of its accessors (glTF 2.0, 3.7.2): each mesh as often as a node
+/// has it. Error: what is wrong.
+tl::expected<std::size_t, std::string> faces_shown(std::string_view content) try {
+  using nlohmann::json;
+  constexpr std::size_t kHead = 20, kMostNodes = 1 << 20;  // of a binary file: its own head and that of its JSON
+  if (content.starts_with("glTF")) {
+    std::uint32_t length = 0;
+    if (content.size() >= kHead) std::memcpy(&length, content.data() + 12, sizeof length);
+    if (length == 0 || content.size() - kHead < length) return tl::make_unexpected("is cut short");
+    content = content.substr(kHead, length);
+  }
+  const json all = json::parse(content);
+  for (const auto& name : all.value("extensionsUsed", json::array()))
+    for (const char* other : {"EXT_meshopt_compression", "EXT_mesh_gpu_instancing"})
+      if (name == other) return tl::make_unexpected(std::string(other) + " is not read; export it without");
+  const auto& scene = all.at("scenes").at(all.value("scene", std::size_t{0}));
+  std::vector<std::size_t> nodes = scene.value("nodes", std::vector<std::size_t>());
+  std::size_t faces = 0;
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    const auto& node = all.at("nodes").at(nodes[n]);
+    for (const auto child : node.value("children", std::vector<std::size_t>())) nodes.push_back(child);
+    if (nodes.size() > kMostNodes) return tl::make_unexpected("its nodes lead in a circle");
+    if (!node.contains("mesh")) continue;
+    for (const auto& part : all.at("meshes").at(node["mesh"].get<std::size_t>()).at("primitives")) {
+      const auto& corners = part.contains("indices") ? part["indices"] : part.at("attributes").at("POSITION");
+      const auto& accessor = all.at("accessors").at(corners.get<std::size_t>());
+      faces += faces_of(accessor.at("count").get<std::size_t>(), part.value("mode", 4));
+    }
+  }
+  return faces;
+} catch (const nlohmann::json::exception& error) {
+  return tl::make_unexpected("glTF: " + one_line(error.what()));
+}
+
 }  // namespace
 
-Read read_mesh(const std::string& path) {
-  std::size_t bytes = 0;
-  if (const auto content = content_of(path, "a mesh"); content)
-    bytes = content->size();
-  else
-    return tl::make_unexpected(content.error());
-  // A slow text format takes a second for 1 MiB; an OBJ takes up to 20 bytes of memory for each of its own.
+Read read_mesh(const std::string& path, std::string_view content, bool gltf) {
+  const auto stated = gltf ? faces_shown(content) : facets_of(content);
+  if (!stated) return corrupt(path, ": " + stated.error() + "; export it again");
+  const std::size_t bytes = content.size();
+  // A slow text format takes a second for 1 MiB.
   const std::size_t seconds = 20 + (bytes >> 20), most_bytes = (std::size_t{2} << 30) + 40 * bytes;
-  const auto said = in_child([&](const Sink& sink) { import(path, sink); }, seconds, most_bytes);
+  const auto said = in_child([&](const Sink& sink) { import(path, content, gltf, sink); }, seconds, most_bytes);
   if (!said) return corrupt(path, ": its reader " + said.error() + ": it is damaged; export it again");
   if (said->starts_with('E')) return corrupt(path, ": " + one_line(said->substr(1)) + "; export it again");
   std::size_t at = 1;
@@ -111,6 +181,9 @@ Read read_mesh(const std::string& path) {
   geometry.points.reserve(corners.size());
   for (const auto& corner : corners) geometry.points.push_back(corner.cast<double>());
   geometry.single = true;
+  if (gltf) geometry.up = "y";
+  geometry.stated = *stated;
+  geometry.taken = geometry.triangles.size();
   return geometry;
 }
 

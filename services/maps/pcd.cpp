@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 
-#include "services/maps/content.hpp"
 #include "services/maps/geometry.hpp"
 #include "services/maps/scalars.hpp"
 
@@ -133,6 +132,8 @@ Places places_of(const Header& header) {
   return places;
 }
 
+constexpr const char* kMore = ": holds more points than POINTS says; write it again";
+
 std::string take_ascii(std::string_view rest, const Header& header, Geometry& geometry) {
   const auto places = places_of(header);
   std::size_t line_number = header.lines;
@@ -155,7 +156,7 @@ std::string take_ascii(std::string_view rest, const Header& header, Geometry& ge
     }
     geometry.points.push_back(p);
   }
-  return "";
+  return rest.find_first_not_of(" \t\r\n") == rest.npos ? "" : kMore;
 }
 
 /// Points in their order in the file, or (`by_field`) one field of all points after the other.
@@ -165,6 +166,7 @@ std::string take_binary(std::string_view bytes, const Header& header, bool by_fi
   if (bytes.size() / stride < header.points)
     return ": ends after " + std::to_string(bytes.size() / stride) + " of " + std::to_string(header.points) +
            " points of " + std::to_string(stride) + " bytes";
+  if (bytes.size() / stride > header.points) return kMore;
   for (std::size_t n = 0; n < header.points; ++n) {
     Vec3 p;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -209,10 +211,8 @@ bool says_nothing(const std::string& viewpoint) {
 
 }  // namespace
 
-Read read_pcd(const std::string& path) {
-  const auto content = content_of(path, "a PCD file");
-  if (!content) return tl::make_unexpected(content.error());
-  std::string_view rest = *content;
+Read read_pcd(const std::string& path, std::string_view content) {
+  std::string_view rest = content;
   Header header;
   if (const auto wrong = read_header(rest, header); !wrong.empty()) return corrupt(path, ":" + wrong);
   if (header.points > kMostPoints) return too_large(path, header.points);
@@ -221,6 +221,8 @@ Read read_pcd(const std::string& path) {
                      : header.data == "binary" ? take_binary(rest, header, false, geometry)
                                                : take_compressed(rest, header, geometry);
   if (!wrong.empty()) return corrupt(path, wrong);
+  geometry.stated = header.points;
+  geometry.taken = geometry.points.size();
   geometry.single = header.types[places_of(header).field[0]].bytes < 8;
   if (!says_nothing(header.viewpoint))
     geometry.notes.push_back("VIEWPOINT " + header.viewpoint + "is not applied: the points are taken as they stand");

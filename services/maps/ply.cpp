@@ -4,8 +4,6 @@
 #include <cstdio>
 #include <map>
 
-#include "core/files/read_file.hpp"
-#include "services/maps/content.hpp"
 #include "services/maps/geometry.hpp"
 #include "services/maps/scalars.hpp"
 
@@ -134,6 +132,7 @@ class Numbers {
     return value;
   }
   const std::string& wrong() const { return wrong_; }
+  std::size_t line() const { return body_ == Body::ascii ? line_ : 0; }
   std::size_t left() const { return rest_.find_first_not_of(" \t\r\n") == rest_.npos ? 0 : rest_.size(); }
 
  private:
@@ -153,19 +152,25 @@ class Numbers {
   std::string wrong_;
 };
 
+bool is_corners(const Property& property) { return property.count && property.name.starts_with("vertex_ind"); }
+
 std::string plain(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.12g", value);
   return text;
 }
 
+std::size_t vertices_in(const Header& header) {
+  std::size_t count = 0;
+  for (const auto& element : header.elements)
+    if (element.name == "vertex") count += element.count;
+  return count;
+}
+
 /// Takes elements in: corners of faces as triangles around their first one, vertices as points.
 class Taker {
  public:
-  Taker(Geometry& geometry, const Header& header) : geometry_(geometry) {
-    for (const auto& element : header.elements)
-      if (element.name == "vertex") vertices_ = element.count;
-  }
+  Taker(Geometry& geometry, const Header& header) : geometry_(geometry), vertices_(vertices_in(header)) {}
   /// Reads one element; empty, or what is wrong.
   std::string take(const Element& element, std::size_t number, Numbers& numbers) {
     numbers.begin();
@@ -191,7 +196,7 @@ class Taker {
   std::string list(const Element& element, const Property& property, double length, Numbers& numbers) {
     if (!(length >= 0 && length <= static_cast<double>(kMostPoints)))
       return "@: a list of " + plain(length) + " numbers is no list";
-    const bool face = element.name == "face" && property.name.starts_with("vertex_ind");
+    const bool face = element.name == "face" && is_corners(property);
     std::vector<std::uint32_t> corners;
     for (std::size_t n = 0; n < static_cast<std::size_t>(length); ++n) {
       const auto value = numbers.next(property.type);
@@ -201,40 +206,48 @@ class Taker {
         return "@: names vertex " + plain(*value) + ", and there are 0 to " + plain(static_cast<double>(vertices_) - 1);
       corners.push_back(static_cast<std::uint32_t>(*value));
     }
-    for (std::size_t n = 2; n < corners.size(); ++n)
-      geometry_.triangles.push_back({corners[0], corners[n - 1], corners[n]});
+    if (!face) return "";
+    if (corners.empty()) return "@: has no corner";
+    if (geometry_.points.size() < vertices_) return "@: comes before the vertices; write them first";
+    add_face(geometry_, corners, numbers.line());
+    ++geometry_.taken;
     return "";
   }
 
   Geometry& geometry_;
-  std::size_t vertices_ = 0;
+  std::size_t vertices_;
 };
 
 /// What the header says that cannot be read here; empty: nothing.
 std::string unfit(const Header& header) {
+  const auto has = [](const Element& element, const auto& what) {
+    return std::ranges::any_of(element.properties, what);
+  };
+  bool vertices = false;
   for (const auto& element : header.elements) {
-    if (element.name == "tristrips" && element.count > 0)
-      return "has triangle strips; export it with faces of three corners";
-    if (element.name != "vertex") continue;
+    const auto& name = element.name;
+    if ((name == "tristrips" || name == "edge") && element.count > 0)
+      return "has " + name + ", which are not read; export it with faces of three corners";
+    if (name == "face" && element.count > 0 && !has(element, is_corners))
+      return "element face has no list vertex_indices";
+    if (name != "vertex") continue;
+    vertices = true;
     for (const char* axis : {"x", "y", "z"})
-      if (std::ranges::none_of(element.properties, [&](const Property& p) { return p.name == axis && !p.count; }))
+      if (!has(element, [&](const Property& p) { return p.name == axis && !p.count; }))
         return std::string("element vertex has no property ") + axis;
-    return "";
   }
-  return "the header has no element vertex";
+  return vertices ? "" : "the header has no element vertex";
 }
 
 }  // namespace
 
-Read read_ply(const std::string& path) {
-  const auto content = content_of(path, "a PLY file");
-  if (!content) return tl::make_unexpected(content.error());
-  std::string_view rest = *content;
+Read read_ply(const std::string& path, std::string_view content) {
+  std::string_view rest = content;
   const auto header = header_of(rest);
   if (!header) return corrupt(path, ":" + header.error());
   if (const auto wrong = unfit(*header); !wrong.empty()) return corrupt(path, ": " + wrong);
   Geometry geometry;
-  Numbers numbers(rest, content->size(), *header);
+  Numbers numbers(rest, content.size(), *header);
   Taker taker(geometry, *header);
   for (const auto& element : header->elements) {
     if (element.properties.empty() && element.count > 0)
@@ -243,8 +256,13 @@ Read read_ply(const std::string& path) {
       return too_large(path, element.count);
     for (const auto& property : element.properties)
       if (element.name == "vertex" && property.name == "x") geometry.single = property.type.bytes < 8;
+    if (element.name == "face") geometry.stated += element.count;
     for (std::size_t n = 0; n < element.count; ++n)
       if (const auto wrong = taker.take(element, n, numbers); !wrong.empty()) return corrupt(path, wrong);
+  }
+  if (geometry.triangles.empty()) {
+    geometry.stated = vertices_in(*header);
+    geometry.taken = geometry.points.size();
   }
   if (numbers.left() > 0)
     geometry.notes.push_back(std::to_string(numbers.left()) + " bytes after the last element were not read");

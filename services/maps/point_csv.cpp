@@ -4,6 +4,7 @@
 
 #include "core/log/columns/flight_log.hpp"
 #include "services/maps/geometry.hpp"
+#include "services/maps/scalars.hpp"
 
 namespace backwash::maps {
 namespace {
@@ -32,7 +33,7 @@ std::vector<Vec3> rows_of(const log::FlightLog& table, const Names& names) {
 
 }  // namespace
 
-Read read_point_csv(const std::string& path) {
+Read read_point_csv(const std::string& path, std::string_view content) {
   const auto present = log::csv_names(path);
   if (!present) return from(present.error());
   const auto place = first_present(*present, {{"x_m", "y_m", "z_m"}, {"x", "y", "z"}, {"X", "Y", "Z"}});
@@ -45,6 +46,10 @@ Read read_point_csv(const std::string& path) {
   if (!table) return from(table.error());
   if (table->column(place[0]).size() > kMostPoints) return too_large(path, table->column(place[0]).size());
   Geometry geometry;
+  // Rows, but for the first line, by their ends; a row of nothing is none.
+  for (take_line(content); !content.empty();)
+    geometry.stated += take_line(content).find_first_not_of(" \t\r") != std::string_view::npos;
+  geometry.taken = table->column(place[0]).size();
   geometry.points = rows_of(*table, place);
   if (!sensor.empty()) geometry.sensors = rows_of(*table, sensor);
   for (std::size_t n = 0; n < geometry.sensors.size(); ++n)

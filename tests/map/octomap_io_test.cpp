@@ -2,6 +2,8 @@
 // Oracle: liboctomap itself, with which files are exchanged in both directions.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <octomap/ColorOcTree.h>
+#include <octomap/OcTreeStamped.h>
 
 #include <unistd.h>
 
@@ -74,6 +76,41 @@ TEST(OctomapFile, ReadsBothFormatsOfLiboctomap) {
   }
 }
 
+/// The world in a tree of liboctomap whose nodes hold more than occupancy, in both formats.
+template <class Tree, class Mark>
+void reads_occupancy_of(const OccupancyGrid& world, Mark mark) {
+  Tree tree(world.resolution());
+  for (std::size_t i = 0; i < world.cell_count(); ++i)
+    if (world.at(i) != Cell::unknown)
+      mark(*tree.updateNode(point(world.center(world.voxel(i))), world.at(i) == Cell::occupied, true), i);
+  tree.updateInnerOccupancy();
+  for (const bool binary : {true, false}) {
+    const TemporaryFile file(binary ? ".bt" : ".ot");
+    ASSERT_TRUE(binary ? tree.writeBinary(file.path()) : tree.write(file.path()));
+    const auto loaded = load_map(file.path());
+    ASSERT_TRUE(loaded) << tree.getTreeType() << ": " << loaded.error().message;
+    expect_same_world(*loaded, world);
+    const std::string whole = file.content();
+    for (std::size_t cut = 1; cut < 12; ++cut) {  // within a node, its colour too
+      file.write(whole.substr(0, whole.size() - cut));
+      EXPECT_FALSE(load_map(file.path())) << tree.getTreeType() << " without its last " << cut << " bytes";
+    }
+  }
+}
+
+TEST(OctomapFile, ReadsTheOccupancyOfColouredAndStampedTrees) {
+  std::mt19937_64 random(11);
+  auto grid = random_grid(random, 20);
+  while (!has_known_cells(grid)) grid = random_grid(random, 20);
+  for (const auto& world : {grid, builtin_scene("narrow-gap", 0.2).value()}) {
+    reads_occupancy_of<octomap::ColorOcTree>(world, [](octomap::ColorOcTreeNode& node, std::size_t i) {
+      node.setColor(static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(i >> 8), 255);
+    });
+    reads_occupancy_of<octomap::OcTreeStamped>(
+        world, [](octomap::OcTreeNodeStamped& node, std::size_t i) { node.setTimestamp(static_cast<unsigned>(i)); });
+  }
+}
+
 /// A small world in both formats, to be damaged.
 std::vector<std::string> sample_files() {
   auto tree = tree_of(builtin_scene("narrow-gap", 0.2).value());
@@ -113,7 +150,7 @@ TEST(OctomapFile, NamesTheFileAndTheFaultInOneLine) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"", "first line"},
       {"ply\n" + good, "first line"},
-      {replaced("id ", "id ColorOcTree\n"), "OcTree"},
+      {replaced("id ", "id RoughOcTree\n"), "convert_octree IN OUT.bt"},
       {replaced("id ", ""), "OcTree"},
       {replaced("res ", "res 0\n"), "resolution"},
       {replaced("res ", "res -0.1\n"), "resolution"},

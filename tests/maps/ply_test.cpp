@@ -101,6 +101,37 @@ TEST_F(Ply, LosesNotFinitePointsOfACloudWithACountAndRefusesThemInAMesh) {
           "corner 2, of triangle 2, is no finite place");
 }
 
+TEST_F(Ply, RefusesFacesThatItWouldLose) {
+  const std::string vertices = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+  const std::string begin = "ply\nformat ascii 1.0\n", end = "end_header\n", xyz = "0 0 0\n1 0 0\n0 1 0\n";
+  refused("a.ply",
+          begin + vertices + "element tristrips 1\nproperty list int int vertex_indices\n" + end + xyz + "3 0 1 2\n",
+          "has tristrips, which are not read");
+  refused("b.ply", begin + vertices + "element face 1\nproperty list uchar int corners\n" + end + xyz + "3 0 1 2\n",
+          "element face has no list vertex_indices");
+  refused("c.ply",
+          begin + "element face 1\nproperty list uchar int vertex_index\n" + vertices + end + "3 0 1 2\n" + xyz,
+          "face 1 of 1: comes before the vertices");
+  refused("d.ply", begin + vertices + "element face 1\nproperty list uchar int vertex_index\n" + end + xyz + "0\n",
+          "face 1 of 1: has no corner");
+  const auto thin = read("e.ply", begin + vertices + "element face 2\nproperty list uchar int vertex_index\n" + end +
+                                      xyz + "2 0 1\n3 0 1 2\n");
+  ASSERT_TRUE(thin) << thin.error().message;
+  EXPECT_EQ(thin->triangles, (std::vector<std::array<std::uint32_t, 3>>{{0, 1, 1}, {0, 1, 2}}));
+  EXPECT_EQ(thin->notes.at(0), "1 triangles have no area: they are lines or points of the map");
+}
+
+TEST_F(Ply, LeavesOutWhatAScannerWritesWhereNothingCameBack) {
+  const std::string cloud =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+  const auto got = read("cloud.ply", cloud + "0 0 0\n1 2 3\nnan nan nan\n0 -0 0\n");
+  ASSERT_TRUE(got) << got.error().message;
+  EXPECT_EQ(got->points, (std::vector<Vec3>{{1, 2, 3}}));
+  EXPECT_EQ(got->not_finite, 1u);
+  EXPECT_EQ(got->notes.at(0), "2 points at (0, 0, 0) are no returns and were left out");
+  EXPECT_EQ(read("one.ply", cloud + "0 0 0\n1 2 3\n1 1 1\n2 2 2\n")->points.size(), 4u) << "one may be a place";
+}
+
 class Pcd : public MapFiles {
  protected:
   static constexpr std::size_t kPoints = 50;
@@ -166,6 +197,9 @@ TEST_F(Pcd, IsRefusedCutShortInAllThreeForms) {
   refused("b.pcd", header("binary") + plain.substr(0, plain.size() - 1), "ends after 49 of 50 points of 30 bytes");
   refused("c.pcd", header("binary_compressed") + packed.substr(0, packed.size() - 1), "bytes of compressed points");
   refused("d.pcd", header("binary_compressed") + "abc", "ends before the lengths");
+  const std::string more = "holds more points than POINTS says";
+  refused("e.pcd", header("ascii") + text + text, more);
+  refused("f.pcd", header("binary") + plain + plain.substr(0, 30), more);
 }
 
 TEST_F(Pcd, NamesTheLineAndTheValueThatIsWrong) {

@@ -20,7 +20,7 @@ convert() { refused "$1" "$2" convert "${@:3}" -o out.bt; }
 
 printf 'v 0 0 0\nv 4 0 0\nv 4 3 0\nv 0 3 0\nf 1 2 3 4\n' >floor.obj
 printf 'v 0 0 0\nv 4000 0 0\nv 4000 3000 0\nf 1 2 3\n' >mm.obj
-printf 'v 500000 5600000 0\nv 500004 5600000 0\nv 500000 5600003 0\nf 1 2 3\n' >utm.obj
+printf 'ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n500000 5600000 0\n' >utm.ply
 printf 'x,y,z\n500000,5600000,101\n500004,5600003,103\n' >utm.csv
 printf 'x,y,z\n1,1,1\n2,2,2\n' >cloud.csv
 printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n' >indices.obj
@@ -53,18 +53,18 @@ refused 64 "--model is asked with a --vehicle" info builtin:apartment --model bu
 # files
 convert 66 "absent.ply: cannot be read" absent.ply
 convert 66 "absent.bt" absent.bt
-convert 66 "fifo.ply: is a FIFO; needs a PLY file" fifo.ply
+convert 66 "fifo.ply: is a FIFO; needs a mesh, a cloud or a recording" fifo.ply
 convert 66 "builtin:nowhere" builtin:nowhere
 refused 66 "absent.bt" info absent.bt
 convert 65 "pdal translate room.las room.ply" room.las
-convert 65 "indices.obj: OBJ: vertex index out of range" indices.obj
+convert 65 "indices.obj:4: '9' names none of 3 vertices" indices.obj
 convert 65 "short.ply:10: ends too early in vertex 3 of 3" short.ply
 convert 65 "short.bt" short.bt
 refused 65 "short.bt" info short.bt
 # sizes
 convert 65 "--scale 0.001 if that is mm" mm.obj
 convert 65 "536870912 are the most: a smaller --crop, or --resolution " cloud.csv --resolution 0.001
-convert 65 "in 32 bits are off by up to 0.334 m" utm.obj
+convert 65 "in 32 bits are off by up to 0.334 m" utm.ply
 convert 65 "--origin 500002,5600002,102" utm.csv
 convert 65 "nothing of it is in the map" floor.obj --crop 10,10,10,11,11,11
 convert 65 "fewer --points-least" cloud.csv --points-least 2

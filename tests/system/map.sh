@@ -92,3 +92,19 @@ thin = load("thin")
 assert thin["occupied_voxels"] == 1 and thin["free_voxels"] == 14, thin
 PYTHON
 grep -q '^14 triangles written to mm.bt' mm.txt || die "mm.txt: $(<mm.txt)"
+
+# Files that people have (shared/data/field): a wall whose faces name texture coordinates that are not there stands.
+field=$here/../../../shared/data/field
+if [[ ! -d $field ]]; then
+  echo "not tried: $field is not there"
+  exit 0
+fi
+for name in two_rooms_ok two_rooms_wall_lost; do
+  "$backwash" map convert "$field/$name.obj" --free-from 2,2,1.5 --free-from 6,2,1.5 -o $name.bt >/dev/null
+done
+cmp two_rooms_ok.bt two_rooms_wall_lost.bt || die "without vt lines it is another map"
+through=0
+"$backwash" plan --map two_rooms_wall_lost.bt --model builtin:quad-5in --vehicle builtin:quad-5in --start 2,2,1.5 --goal 6,2,1.5 >/dev/null 2>&1 || through=$?
+[[ $through == 69 ]] || die "a plan through the wall: exit $through"
+"$backwash" map convert "$field/k_vt_after_faces.obj" -o box.bt | grep -q '^12 triangles written' || die "k_vt_after_faces.obj has 12 triangles"
+"$backwash" map info "$field/color.bt" | grep -q '^occupied    7568 voxels' || die "color.bt has 7568 occupied voxels"

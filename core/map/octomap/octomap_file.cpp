@@ -11,7 +11,7 @@ namespace backwash::map {
 
 std::string octomap_file(const OccupancyGrid& grid) {
   const auto data = encode_octomap(grid);
-  const auto nodes = octomap_tree::walk(data, true, [](const Index3&, int, Cell) {}).nodes;
+  const auto nodes = octomap_tree::walk(data, true, 0, [](const Index3&, int, Cell) {}).nodes;
   std::ostringstream file;
   file.precision(std::numeric_limits<double>::max_digits10);
   file << "# Octomap OcTree binary file\nid OcTree\nsize " << nodes << "\nres " << grid.resolution() << "\ndata\n";

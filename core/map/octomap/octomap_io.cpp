@@ -78,7 +78,8 @@ tl::expected<OccupancyGrid, MapError> load_octomap(const std::string& path, std:
   const std::span data(reinterpret_cast<const std::int8_t*>(header.data->data()), header.data->size());
   auto grid = decode_octomap(data, *header.resolution, binary, header.id, max_bytes);
   if (!grid) return error(grid.error().kind, path, grid.error().message);
-  const auto nodes = octomap_tree::walk(data, binary, [](const Index3&, int, Cell) {}).nodes;
+  const auto nodes =
+      octomap_tree::walk(data, binary, *octomap_tree::bytes_beside(header.id), [](const Index3&, int, Cell) {}).nodes;
   if (nodes != *header.nodes) {
     return error(
         Kind::corrupt, path,

@@ -72,12 +72,15 @@ std::vector<std::int8_t> encode_octomap(const OccupancyGrid& grid) {
 
 tl::expected<OccupancyGrid, MapError> decode_octomap(std::span<const std::int8_t> data, double resolution, bool binary,
                                                      const std::string& id, std::size_t max_bytes) {
-  if (id != "OcTree") return corrupt("the id is not 'OcTree', the only tree type read");
+  const auto beside = octomap_tree::bytes_beside(id);
+  if (!beside)
+    return corrupt(
+        "the id is not OcTree, ColorOcTree or OcTreeStamped; of another tree's file: convert_octree IN OUT.bt");
   if (!(resolution >= 1e-3 && resolution <= 10)) {
     return corrupt("resolution " + std::to_string(resolution) + " m, expected 0.001 to 10 m");
   }
   Extent extent;
-  const auto found = octomap_tree::walk(data, binary, [&](const Index3& key, int edge, Cell) {
+  const auto found = octomap_tree::walk(data, binary, *beside, [&](const Index3& key, int edge, Cell) {
     extent.low = extent.low.cwiseMin(key);
     extent.high = extent.high.cwiseMax(key + Index3::Constant(edge));
   });
@@ -91,7 +94,7 @@ tl::expected<OccupancyGrid, MapError> decode_octomap(std::span<const std::int8_t
                                                 " MiB, the cap is " + std::to_string(max_bytes >> 20) + " MiB"});
   }
   OccupancyGrid grid(resolution * (extent.low.array() - kCenter).cast<double>(), resolution, size);
-  octomap_tree::walk(data, binary, [&](const Index3& key, int edge, Cell cell) {
+  octomap_tree::walk(data, binary, *beside, [&](const Index3& key, int edge, Cell cell) {
     const Index3 low = key - extent.low;
     for (int k = 0; k < edge; ++k) {
       for (int j = 0; j < edge; ++j) {

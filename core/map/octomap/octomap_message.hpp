@@ -19,7 +19,8 @@ std::vector<std::int8_t> encode_octomap(const OccupancyGrid& grid);
 
 /// Grid of an octomap_msgs/Octomap: `resolution` (m), `binary` and `id` as in the message, extents and cells as in
 /// load_octomap. Accepted whole or not at all. Errors: corrupt (truncated, left-over bytes, too deep, empty, an id
-/// other than OcTree, resolution outside 1 mm … 10 m), too_large (checked before anything of that size is allocated).
+/// other than OcTree, ColorOcTree and OcTreeStamped, whose occupancy is read, resolution outside 1 mm … 10 m),
+/// too_large (checked before anything of that size is allocated).
 tl::expected<OccupancyGrid, MapError> decode_octomap(std::span<const std::int8_t> data, double resolution, bool binary,
                                                      const std::string& id, std::size_t max_bytes = 512u << 20);
 

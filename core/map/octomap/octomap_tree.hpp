@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <span>
+#include <string_view>
 
 #include "core/map/occupancy_grid.hpp"
 
@@ -21,6 +23,13 @@ struct Walk {
   const char* fault = nullptr;
 };
 
+/// Bytes that a node of an occupancy tree's full stream holds between its log-odds and its children, by the tree's id
+/// as liboctomap's AbstractOcTree knows it: a colour, or nothing. A time stamp is not written. Nothing: another tree.
+inline std::optional<std::size_t> bytes_beside(std::string_view id) noexcept {
+  if (id == "OcTree" || id == "OcTreeStamped") return 0;
+  return id == "ColorOcTree" ? std::optional<std::size_t>(3) : std::nullopt;
+}
+
 /// Key of child i (bit 0: x, bit 1: y, bit 2: z) of the node at `key` whose children have `edge` voxels.
 inline Index3 child_key(const Index3& key, int i, int edge) noexcept {
   return key + edge * Index3(i & 1, i >> 1 & 1, i >> 2 & 1);
@@ -30,7 +39,8 @@ inline Index3 child_key(const Index3& key, int i, int edge) noexcept {
 template <class OnLeaf>
 class Reader {
  public:
-  Reader(std::span<const std::int8_t> data, OnLeaf on_leaf) : data_(data), on_leaf_(on_leaf) {}
+  Reader(std::span<const std::int8_t> data, std::size_t beside, OnLeaf on_leaf)
+      : data_(data), beside_(beside), on_leaf_(on_leaf) {}
 
   Walk read(bool binary) {
     if (data_.empty()) return {0, "the tree is empty"};
@@ -62,12 +72,12 @@ class Reader {
     }
   }
 
-  /// Node of writeData: log-odds as float, one bit per child, then the children. A leaf is occupied from
-  /// p = 0.5, OcTree's default threshold; the stream carries none.
+  /// Node of writeData: log-odds as float, what is beside it, one bit per child, then the children. A leaf is occupied
+  /// from p = 0.5, OcTree's default threshold; the stream carries none.
   void full_node(const Index3& key, int level) {
     float log_odds = 0;
     std::uint8_t children = 0;
-    if (!take(log_odds) || !take(children)) return;
+    if (!take(log_odds) || !pass(beside_) || !take(children)) return;
     if (std::isnan(log_odds)) return fail("a node's log-odds is not a number");
     if (children == 0) return on_leaf_(key, 1 << level, log_odds >= 0 ? Cell::occupied : Cell::free);
     if (level == 0) return fail("the tree is deeper than 16 levels");
@@ -79,28 +89,35 @@ class Reader {
     }
   }
 
-  template <class T>
-  bool take(T& value) {
-    if (data_.size() - position_ < sizeof(T)) {
+  bool pass(std::size_t bytes) {
+    if (data_.size() - position_ < bytes) {
       fail("the data end in the middle of the tree");
       return false;
     }
-    std::memcpy(&value, data_.data() + position_, sizeof(T));  // little-endian, like every writer of these files
-    position_ += sizeof(T);
+    position_ += bytes;
+    return true;
+  }
+  template <class T>
+  bool take(T& value) {
+    if (!pass(sizeof(T))) return false;
+    // Little-endian, like every writer of these files.
+    std::memcpy(&value, data_.data() + position_ - sizeof(T), sizeof(T));
     return true;
   }
   void fail(const char* what) { walk_.fault = what; }
 
   std::span<const std::int8_t> data_;
+  std::size_t beside_;
   OnLeaf on_leaf_;
   std::size_t position_ = 0;
   Walk walk_;
 };
 
-/// Walks a stream of writeBinaryData (`binary`) or writeData. O(bytes), recursion at most 16 deep.
+/// Walks a stream of writeBinaryData (`binary`), which is the same for every occupancy tree, or writeData, whose nodes
+/// hold `beside` bytes more (bytes_beside). O(bytes), recursion at most 16 deep.
 template <class OnLeaf>
-Walk walk(std::span<const std::int8_t> data, bool binary, OnLeaf on_leaf) {
-  return Reader<OnLeaf>(data, on_leaf).read(binary);
+Walk walk(std::span<const std::int8_t> data, bool binary, std::size_t beside, OnLeaf on_leaf) {
+  return Reader<OnLeaf>(data, beside, on_leaf).read(binary);
 }
 
 }  // namespace backwash::map::octomap_tree

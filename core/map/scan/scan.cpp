@@ -48,7 +48,7 @@ void LiveMap::take_along(const LiveMap& other, const Index3& low) noexcept {
   });
 }
 
-ScanChange LiveMap::insert(std::span<const Vec3> points_W, const Vec3& sensor_W, double max_range) {
+ScanChange LiveMap::insert(std::span<const Vec3> points_W, const Vec3& sensor_W, double max_range, int misses) {
   ScanChange change;
   const double a = grid_.resolution();
   const Vec3 sensor = (sensor_W - grid_.origin()) / a;
@@ -66,7 +66,7 @@ ScanChange LiveMap::insert(std::span<const Vec3> points_W, const Vec3& sensor_W,
     if (seen_[n] == Seen::hit) {
       now = Cell::occupied;
       misses_[n] = kFound;
-    } else if (before != Cell::occupied || (++misses_[n] & ~kFound) >= kMissesToFree) {
+    } else if (before != Cell::occupied || (++misses_[n] & ~kFound) >= misses) {
       now = Cell::free;
       misses_[n] = 0;
     }

@@ -43,9 +43,9 @@ class LiveMap {
   /// through it. `low` is the voxel of that grid at this one's first.
   void take_along(const LiveMap& other, const Index3& low) noexcept;
   /// Casts a ray from the sensor to each point (m in W); the last voxel of a ray is not passed. Points farther than
-  /// `max_range` (m) only free the way up to there. Precondition: the sensor is inside the grid and max_range < 1 km.
-  /// O(points · range/a).
-  ScanChange insert(std::span<const Vec3> points_W, const Vec3& sensor_W, double max_range);
+  /// `max_range` (m) only free the way up to there. `misses`: scans in a row that free an occupied voxel, at most 127.
+  /// Precondition: the sensor is inside the grid and max_range < 1 km. O(points · range/a).
+  ScanChange insert(std::span<const Vec3> points_W, const Vec3& sensor_W, double max_range, int misses = kMissesToFree);
 
  private:
   enum class Seen : std::uint8_t { nothing, passed, hit };

@@ -17,6 +17,8 @@ struct MapVerbOptions {
   MapOptions map;
   std::string out;
   std::vector<Vec3> seeds;
+  std::optional<double> body_radius;
+  std::string vehicle;
   bool json = false, force = false;
 };
 
@@ -70,10 +72,12 @@ void print_text(const MapVerbOptions& options, const MadeMap& made) {
   for (const auto& note : made.notes) std::printf("note: %s\n", note.c_str());
 }
 
-int run(const MapVerbOptions& options) {
+int run(MapVerbOptions options) {
   if (!options.out.ends_with(".bt"))
     throw Failure(kUsage, "--out " + options.out + " is a binary OctoMap file; name it .bt");
   check_output(options.out, options.force);
+  const double radius = options.vehicle.empty() ? 0 : read_vehicle(options.vehicle).body.radius;
+  options.map.body_radius = options.body_radius.value_or(radius);
   MadeMap made = make_map(options.map);
   const auto flooded = flood(options, made.grid);
   note_edges(flooded, made);
@@ -84,7 +88,8 @@ int run(const MapVerbOptions& options) {
   if (count.free == 0)
     made.notes.push_back(
         "nothing is free: a vehicle can be nowhere; --free-from a place in the air, or --sensor of a scan");
-  write_file(options.out, map::octomap_file(made.grid), options.force);
+  write_file(options.out, map::octomap_file(made.grid), options.force,
+             [&](const std::string& written) { return lost_in(written, made, options.map.file); });
   options.json ? print_json(options, made, flooded) : print_text(options, made);
   return kOk;
 }
@@ -142,7 +147,10 @@ Command& add_convert(Command& group, const std::shared_ptr<MapVerbOptions>& opti
       .add_text("--sensor", points_to(options->map.sensors, "--sensor"),
                 "a cloud: where it was seen from; the rays to its points are free, m")
       .type_name("X,Y,Z");
-  command.add_option("--topic", options->map.topic, "a recording: its clouds, where it holds those of several topics");
+  command.add_option("--topic", options->map.topic, "a recording: of its clouds, where it has several");
+  command.add_option("--body-radius", options->body_radius, "a recording: points so near are the vehicle's own, m")
+      .check(positive());
+  command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME with that radius");
   command.add_option("--points-least", options->map.points_least, "a cloud: points that make a voxel occupied")
       .check(within(1, 65535))
       .capture_default_str();

@@ -85,7 +85,12 @@ void free_rays(const MapOptions& options, const maps::Geometry& geometry, MadeMa
     if (!made.grid.inside(made.grid.index(sensor)))
       throw Failure(kUnavailable, options.file + ": a sensor at " + to_text(sensor) +
                                       " is outside the map; a wider --crop, or another place");
-  if (!sensors.empty()) made.freed = map::free_by_rays(made.grid, geometry.points, sensors);
+  if (sensors.empty()) return;
+  const auto through = map::free_by_rays(made.grid, geometry.points, sensors);
+  made.freed = through.unknown + through.occupied;
+  if (through.occupied > 0)
+    made.notes.push_back(std::to_string(through.occupied) +
+                         " voxels in which something had been are free: later scans saw through them");
 }
 
 void add_mesh(const maps::Geometry& geometry, MadeMap& made) {
@@ -104,9 +109,7 @@ void add_mesh(const maps::Geometry& geometry, MadeMap& made) {
 }
 
 MadeMap from_geometry(const MapOptions& options) {
-  if (!options.topic.empty() && !options.file.ends_with(".mcap"))
-    throw Failure(kUsage, "--topic is of recordings; " + options.file + " is none");
-  auto read = maps::read_geometry(options.file, options.topic);
+  auto read = maps::read_geometry(options.file, options.topic, options.body_radius);
   if (!read)
     throw Failure(read.error().kind == map::MapError::Kind::not_found ? kNoInput : kBadData, read.error().message);
   maps::Geometry& geometry = *read;
@@ -142,18 +145,19 @@ MadeMap from_geometry(const MapOptions& options) {
     throw Failure(kUsage, "--sensor and --points-least are of clouds; " + options.file + " is a mesh");
   if (mesh) {
     add_mesh(geometry, made);
-    return made;
+  } else {
+    map::add_points(made.grid, geometry.points, options.points_least);
+    free_rays(options, geometry, made);
   }
-  map::add_points(made.grid, geometry.points, options.points_least);
-  free_rays(options, geometry, made);
+  made.from = std::move(geometry);
   return made;
 }
 
 }  // namespace
 
 MadeMap make_map(const MapOptions& options) {
-  const bool octomap =
-      options.file.starts_with("builtin:") || options.file.ends_with(".bt") || options.file.ends_with(".ot");
+  const bool named = options.file.ends_with(".bt") || options.file.ends_with(".ot");
+  const bool octomap = named || options.file.starts_with("builtin:") || maps::is_octomap(options.file);
   if (octomap && (!options.sensors.empty() || options.points_least > 1))
     throw Failure(kUsage, "--sensor and --points-least are of clouds; " + options.file + " is none");
   return octomap ? from_octomap(options) : from_geometry(options);

@@ -31,12 +31,12 @@ std::vector<const dds::detail::ReaderBase*> read_of(const dds::Reader<dds::Octom
 
 }  // namespace
 
-MapFront::MapFront(const config::Daemon& config, Channels& channels, Recorder& recorder)
+MapFront::MapFront(const config::Daemon& config, double body_radius, Channels& channels, Recorder& recorder)
     : channels_(channels),
       recorder_(recorder),
       map_frame_(config.frames.map),
       sensor_range_(config.map.sensor_range),
-      placement_(config),
+      placement_(config, body_radius),
       refusals_(channels.refused_map),
       assembly_(kMaxMapBytes, config.frames.map),
       participant_(static_cast<std::uint32_t>(config.dds.domain), config.dds.interface,
@@ -87,7 +87,8 @@ void MapFront::take_scans() {
       if (fresh > 0) channels_.scan_voxels.push_or_count(voxels);
     }
     recorder_.append(log::RecordKind::scan, "scan of " + std::to_string(scan->points_W.size()) + " points, " +
-                                                std::to_string(fresh) + " new voxels");
+                                                std::to_string(fresh) + " new voxels, " + std::to_string(scan->own) +
+                                                " points on the vehicle left out");
     auto owned = std::make_unique<Scan>(std::move(*scan));
     if (channels_.scans.push(owned.get()))
       static_cast<void>(owned.release());  // the ring holds it

@@ -35,7 +35,8 @@ class MapFront {
  public:
   static constexpr std::size_t kMaxMapBytes = 48u << 20;  ///< larger maps are refused before they are copied
 
-  MapFront(const config::Daemon& config, Channels& channels, Recorder& recorder);
+  /// `body_radius`: as of ScanPlacement.
+  MapFront(const config::Daemon& config, double body_radius, Channels& channels, Recorder& recorder);
   ~MapFront();
   MapFront(const MapFront&) = delete;
   MapFront& operator=(const MapFront&) = delete;

@@ -39,6 +39,7 @@ struct Scan {
   Vec3 sensor_W = Vec3::Zero();
   std::int64_t received_ns = 0;
   std::uint32_t closures = 0;  ///< loop closures that its map frame has seen
+  std::size_t own = 0;         ///< points on the vehicle itself, which are left out
 };
 
 /// Boxes of the map's lattice that are not free any more, by a scan, a window or a map, and that the newest snapshot

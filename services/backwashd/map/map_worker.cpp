@@ -20,6 +20,7 @@
 
 #include "core/config/file_hash.hpp"
 #include "core/map/octomap/octomap_message.hpp"
+#include "core/map/octomap/octomap_tree.hpp"
 #include "core/reach/response/integrator.hpp"
 #include "services/backwashd/channels.hpp"
 #include "services/backwashd/map/map_change.hpp"
@@ -301,7 +302,15 @@ std::optional<map::OccupancyGrid> MapWorker::accepted(const MapMessage& message)
   auto grid = map::decode_octomap(message.data, message.resolution, message.binary, message.id,
                                   window_ ? window_->most_voxels() : cap);
   const std::string why = wrong(message, grid);
-  record(recorder_, message, why.empty());
+  const bool more = why.empty() && !message.binary && map::octomap_tree::bytes_beside(message.id) != 0;
+  if (more) {  // logs hold occupancy alone
+    MapMessage known = message;
+    known.data = map::encode_octomap(*grid);
+    known.binary = true;
+    record(recorder_, known, true);
+  } else {
+    record(recorder_, message, why.empty());
+  }
   if (!why.empty()) {
     reject(message, why);
     return std::nullopt;

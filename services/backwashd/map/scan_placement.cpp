@@ -68,6 +68,7 @@ tl::expected<Scan, std::string> ScanPlacement::scan(const dds::PointCloud& m, st
   }
   Scan scan{std::move(cloud->points), cloud->viewpoint ? place * *cloud->viewpoint : pose->p, received_ns, closures_};
   for (Vec3& p : scan.points_W) p = place * p;
+  scan.own = std::erase_if(scan.points_W, [&](const Vec3& p) { return (p - pose->p).norm() < body_radius_; });
   return scan;
 }
 

@@ -18,15 +18,18 @@ namespace backwash::daemon {
 /// that reads those.
 class ScanPlacement {
  public:
-  explicit ScanPlacement(const config::Daemon& config)
-      : frames_(config.frames), most_apart_ns_(std::llround(2e9 / config.odometry.timing.rate_least)) {}
+  /// `body_radius`: of the vehicle, m: what a scan sees nearer to its middle is the vehicle itself, or no return.
+  explicit ScanPlacement(const config::Daemon& config, double body_radius = 0)
+      : frames_(config.frames),
+        body_radius_(body_radius),
+        most_apart_ns_(std::llround(2e9 / config.odometry.timing.rate_least)) {}
 
   /// A pose in the map. One behind a loop closure moves the poses before it into the new map frame.
   void add(const OdometrySample& sample);
   /// The newest loop closure, map ← odom.
   void close(const track::RigidShift& map_from_odom) { map_from_odom_ = map_from_odom; }
-  /// The sensor is the cloud's viewpoint, or, without one, the body's origin. Error: one line that says what would be
-  /// right.
+  /// The sensor is the cloud's viewpoint, or, without one, the body's origin. The vehicle itself is left out. Error:
+  /// one line that says what would be right.
   tl::expected<Scan, std::string> scan(const dds::PointCloud& message, std::int64_t received_ns) const;
 
   /// Where the newest pose is, m in the map.
@@ -43,6 +46,7 @@ class ScanPlacement {
   std::optional<Pose> pose_at(std::int64_t stamp_ns) const;
 
   decltype(config::Daemon::frames) frames_;
+  double body_radius_;
   std::int64_t most_apart_ns_;  // of two poses: between them a scan has a place
   std::optional<track::RigidShift> map_from_odom_;
   std::uint32_t closures_ = 0;           // of the newest pose

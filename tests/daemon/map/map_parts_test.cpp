@@ -225,7 +225,7 @@ TEST(MapFront, TellsTheSenderOfPartsThatANewerWholeMapTookItsPlace) {
   const std::string log = testing::TempDir() + "map_front." + std::to_string(::getpid());
   Channels channels;
   Recorder recorder(log);
-  MapFront front(config, channels, recorder);
+  MapFront front(config, 0, channels, recorder);
   std::jthread reader([&] { front.run_readers(); });
   const dds::Participant sender(static_cast<std::uint32_t>(config.dds.domain), "lo");
   auto parts = dds::make_writer<dds::MapPart>(sender, "backwash");

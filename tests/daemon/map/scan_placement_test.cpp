@@ -58,6 +58,24 @@ TEST(ScanPlacement, PlacesAScanOfTheBodyByThePoseAtItsStamp) {
   EXPECT_EQ(l.scan(PointMessage(kMap, {1, 0, 0}, 1.05).m, 0)->points_W[0], Vec3(1, 0, 0));
 }
 
+TEST(ScanPlacement, LeavesOutTheVehicleItselfAndNoReturnsAndNothingElse) {
+  ScanPlacement l(config::Daemon{}, 0.16);
+  l.add(pose({2, 0, 1}, 0.4, 1.0));
+  for (const Vec3& own : {Vec3(0.1, -0.1, 0.02), Vec3(0, 0, 0), Vec3(-0.15, 0, 0)}) {  // arms, and no return
+    const auto scan = l.scan(PointMessage(kBody, own, 1.0).m, 3);
+    ASSERT_TRUE(scan) << scan.error();
+    EXPECT_TRUE(scan->points_W.empty()) << own.transpose();
+    EXPECT_EQ(scan->own, 1u);
+  }
+  for (const auto& [frame, other] :
+       {std::pair{kBody, Vec3(0.17, 0, 0)}, {kBody, Vec3(0, 0, -0.17)}, {kMap, Vec3(0, 0, 0)}}) {
+    const auto scan = l.scan(PointMessage(frame, other, 1.0).m, 3);
+    EXPECT_EQ(scan->points_W.size(), 1u) << frame << " " << other.transpose();
+    EXPECT_EQ(scan->own, 0u);
+  }
+  EXPECT_TRUE(l.scan(PointMessage(kMap, {2.1, 0, 1.1}, 1.0).m, 3)->points_W.empty()) << "placed by somebody else";
+}
+
 TEST(ScanPlacement, BetweenPosesFartherApartThanTwoOfTheSlowestOdometryAScanHasNoPlace) {
   ScanPlacement l(config::Daemon{});
   l.add(pose({0, 0, 1}, 0, 1.0));
