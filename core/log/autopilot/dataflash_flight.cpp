@@ -90,7 +90,9 @@ void set_points(const TopicLog& log, TopicLog& out) {
 
 TopicLog px4_names(const TopicLog& dataflash) {
   TopicLog out;
-  out.dropouts = dataflash.dropouts;
+  out.loss = dataflash.loss;
+  out.parameters = dataflash.parameters;
+  out.texts = dataflash.texts;
   translate(dataflash.find("XKF1", core_in_use(dataflash)), "vehicle_local_position",
             {{"x", "PN"}, {"y", "PE"}, {"z", "PD"}, {"vx", "VN"}, {"vy", "VE"}, {"vz", "VD"}}, out);
   attitude(dataflash, out);

@@ -206,13 +206,23 @@ FlightLog flight_of(const TopicLog& topics, const TopicLog::Topic& position) {
 
 }  // namespace
 
-tl::expected<FlightLog, std::string> flight_of(const TopicLog& topics) {
+namespace {
+
+tl::expected<FlightLog, std::string> whole_flight(const TopicLog& topics) {
   const auto* position = topics.find("vehicle_local_position");
   if (!position) return tl::make_unexpected("no topic vehicle_local_position; log it, a flight needs positions");
   const auto dense = rate(*position) < kLeastRate ? densified(topics, *position) : std::nullopt;
   FlightLog log = flight_of(topics, dense && dense->t_s.size() > position->t_s.size() ? *dense : *position);
   for (const char* name : {"x_m", "y_m", "z_m"})
     if (!log.has(name)) return tl::make_unexpected("vehicle_local_position has no finite x, y, z");
+  return log;
+}
+
+}  // namespace
+
+tl::expected<FlightLog, std::string> flight_of(const TopicLog& topics) {
+  auto log = whole_flight(topics);
+  for (const auto& words : topics.loss.words()) log ? log->notes.push_back(words) : void(log.error() += "; " + words);
   return log;
 }
 
