@@ -12,7 +12,8 @@ namespace backwash::log {
 /// lies between two such is skipped, and counted as loss. Error: one line, where no format is found at all.
 tl::expected<TopicLog, std::string> decode_dataflash(std::span<const std::uint8_t> bytes);
 
-/// The same flight under PX4's names: XKF1 of the core that was in use, ATT, IMU, PSCN, PSCE, PSCD, BAT, RCOU, CTUN.
+/// The same flight under PX4's names: XKF1 or NKF1 of the core that was in use, what XKF4 or NKF4 calls valid, ATT,
+/// IMU, PSCN, PSCE, PSCD, BAT, RCOU, CTUN.
 TopicLog px4_names(const TopicLog& dataflash);
 
 /// Reads an ArduPilot log as a flight log. Errors: not_found; bad_data with what is missing.

@@ -47,10 +47,19 @@ const TopicLog::Topic* TopicLog::find(const std::string& name, unsigned instance
   return nullptr;
 }
 
+tl::expected<std::string, LogError> read_topic_file(const std::string& path, const std::string& wanted) {
+  return read_log_file(path, files::kLargestTable, wanted)
+      .and_then([&](std::string content) -> tl::expected<std::string, LogError> {
+        auto plain = files::unzipped(std::move(content), files::kLargestTable);
+        if (!plain) return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + plain.error()});
+        return std::move(*plain);
+      });
+}
+
 tl::expected<FlightLog, LogError> read_topics(
     const std::string& path, const std::string& wanted,
     tl::expected<TopicLog, std::string> (*decode)(std::span<const std::uint8_t> bytes)) {
-  const auto content = read_log_file(path, files::kLargestTable, wanted);
+  const auto content = read_topic_file(path, wanted);
   if (!content) return tl::make_unexpected(content.error());
   const std::span bytes(reinterpret_cast<const std::uint8_t*>(content->data()), content->size());
   const auto topics = decode(bytes);

@@ -42,6 +42,9 @@ struct TopicLog {
 /// notes. Error: the topic that is missing, and what of the file is lost.
 tl::expected<FlightLog, std::string> flight_of(const TopicLog& topics);
 
+/// The content of an autopilot's log, unpacked. Errors: not_found, bad_data.
+tl::expected<std::string, LogError> read_topic_file(const std::string& path, const std::string& wanted);
+
 /// Reads a file, decodes it and makes its flight log. `wanted`: what the path should name. Errors: not_found; bad_data
 /// with what the decoder says, or the topic that is missing.
 tl::expected<FlightLog, LogError> read_topics(

@@ -5,11 +5,12 @@
 #include "core/log/autopilot/autopilot_flight.hpp"
 #include "core/log/autopilot/dataflash.hpp"
 #include "core/log/autopilot/ulog.hpp"
+#include "core/log/kinds/recording.hpp"
 #include "core/log/mcap/mcap_flight.hpp"
-#include "core/log/raw/log_file.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/learn/study_flights.hpp"
+#include "services/command_line/words.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
@@ -22,11 +23,12 @@ struct MergeOptions {
 };
 
 log::TopicLog topics_of(const std::string& path) {
-  const auto content = read_or_fail(log::read_log_file(path, files::kLargestTable, "an autopilot's log"));
+  const auto content = read_or_fail(log::read_topic_file(path, "an autopilot's log"));
   const std::span bytes(reinterpret_cast<const std::uint8_t*>(content.data()), content.size());
-  const bool ulog = path.ends_with(".ulg");
+  const bool ulog = read_or_fail(log::recording_of(path))->name == "ulog";
   auto topics = ulog ? log::decode_ulog(bytes) : log::decode_dataflash(bytes);
   if (!topics) throw Failure(kBadData, path + ":1: " + topics.error());
+  for (const auto& words : topics->loss.words()) say_error("backwash merge", path + ":1: " + words);
   return ulog ? std::move(*topics) : log::px4_names(*topics);
 }
 
@@ -47,7 +49,7 @@ int run(const MergeOptions& options) {
   if (options.logs.size() < 2) throw Failure(kUsage, "needs two logs: that of backwashd, then the autopilot's");
   const std::string &ours = options.logs.front(), &theirs = options.logs.back();
   if (!is_autopilots_log(theirs))
-    throw Failure(kUsage, theirs + " is no autopilot's log by its name; give a .ulg or .bin last");
+    throw Failure(kUsage, theirs + " is no autopilot's log; give PX4's or ArduPilot's own last");
   check_output(options.out, options.force);
   progress("reading the logs");
   const auto log = read_or_fail(log::read_raw_logs(std::span(options.logs).first(options.logs.size() - 1)));
