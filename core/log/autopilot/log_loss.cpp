@@ -32,7 +32,7 @@ void LogLoss::skip(std::size_t bytes) {
 
 void LogLoss::misplace(std::size_t messages) {
   const std::size_t bytes = messages * timed_bytes_ / std::max<std::size_t>(timed_, 1);
-  places_ += messages;
+  misplaced_ += messages;
   skipped_ += bytes;
   read_ -= bytes;
 }
@@ -64,6 +64,7 @@ double LogLoss::share() const {
 
 std::vector<std::string> LogLoss::words() const {
   std::vector<std::string> words;
+  if (misplaced_ > 0) words.push_back(formatted("%zu of its messages are left out: their times fall", misplaced_));
   if (places_ > 0)
     words.push_back(
         formatted("%.2g %% of it is lost, at %zu damaged place%s", 100 * share(), places_, places_ == 1 ? "" : "s"));

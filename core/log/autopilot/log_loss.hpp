@@ -32,7 +32,7 @@ class LogLoss {
 
  private:
   double missing() const;
-  std::size_t read_ = 0, skipped_ = 0, places_ = 0, timed_bytes_ = 0, timed_ = 0, dropouts_ = 0;
+  std::size_t read_ = 0, skipped_ = 0, places_ = 0, timed_bytes_ = 0, timed_ = 0, dropouts_ = 0, misplaced_ = 0;
   std::size_t bridged_ = 0, bridged_bytes_ = 0, open_bytes_ = 0;  // places with a time on both sides; of the last one
   double bridged_s_ = 0, dropout_s_ = 0;
   std::optional<double> first_s_, newest_s_;

@@ -184,7 +184,21 @@ tl::expected<const RecordingKind*, LogError> recording_of(const std::string& pat
 LogError not_read(const std::string& path, const RecordingKind& kind) {
   std::string way(kind.way);
   for (auto at = way.find("FILE"); at != way.npos; at = way.find("FILE", at + path.size())) way.replace(at, 4, path);
+  if (way.empty()) way = "give the autopilot's own log";
   return {LogError::Kind::bad_data, path + ":1: is " + std::string(kind.words) + "; " + way};
+}
+
+tl::expected<TopicLog, LogError> read_autopilots_log(const std::string& path) {
+  const auto kind = recording_of(path);
+  if (!kind) return tl::make_unexpected(kind.error());
+  if ((*kind)->form != Form::autopilot) return tl::make_unexpected(not_read(path, **kind));
+  const auto content = read_topic_file(path, "an autopilot's log");
+  if (!content) return tl::make_unexpected(content.error());
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(content->data()), content->size());
+  const bool ulog = (*kind)->name == "ulog";
+  auto topics = ulog ? decode_ulog(bytes) : decode_dataflash(bytes);
+  if (!topics) return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + topics.error()});
+  return ulog ? std::move(*topics) : px4_names(*topics);
 }
 
 tl::expected<FlightLog, LogError> read_recording(const std::string& path) {

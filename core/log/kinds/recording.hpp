@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/log/columns/flight_log.hpp"
+#include "core/log/mcap/topic_log.hpp"
 
 namespace backwash::log {
 
@@ -28,6 +29,9 @@ tl::expected<const RecordingKind*, LogError> recording_of(const std::string& pat
 /// Reads a file of any kind that is read. Errors: recording_of()'s, the reader's; bad_data with the way of a kind that
 /// is not.
 tl::expected<FlightLog, LogError> read_recording(const std::string& path);
+
+/// The topics of an autopilot's log under PX4's names. Errors: as read_recording(); bad_data for another kind.
+tl::expected<TopicLog, LogError> read_autopilots_log(const std::string& path);
 
 /// Why a file of a kind is not read, and what makes it readable.
 LogError not_read(const std::string& path, const RecordingKind& kind);

@@ -3,8 +3,6 @@
 #include <cstdio>
 
 #include "core/log/autopilot/autopilot_flight.hpp"
-#include "core/log/autopilot/dataflash.hpp"
-#include "core/log/autopilot/ulog.hpp"
 #include "core/log/kinds/recording.hpp"
 #include "core/log/mcap/mcap_flight.hpp"
 #include "services/backwash/files.hpp"
@@ -21,16 +19,6 @@ struct MergeOptions {
   std::string out;
   bool json = false, force = false;
 };
-
-log::TopicLog topics_of(const std::string& path) {
-  const auto content = read_or_fail(log::read_topic_file(path, "an autopilot's log"));
-  const std::span bytes(reinterpret_cast<const std::uint8_t*>(content.data()), content.size());
-  const bool ulog = read_or_fail(log::recording_of(path))->name == "ulog";
-  auto topics = ulog ? log::decode_ulog(bytes) : log::decode_dataflash(bytes);
-  if (!topics) throw Failure(kBadData, path + ":1: " + topics.error());
-  for (const auto& words : topics->loss.words()) say_error("backwash merge", path + ":1: " + words);
-  return ulog ? std::move(*topics) : log::px4_names(*topics);
-}
 
 /// The distance of its poses from what was told, where they are those of this flight: the clocks count from each start
 /// of the autopilot, and by them alone any of its logs fits somewhere.
@@ -57,7 +45,9 @@ int run(const MergeOptions& options) {
   if (pairs.empty())
     throw Failure(kBadData, ours + ":1: holds no answer of the autopilot to TIMESYNC: the clocks cannot be compared");
   const auto clock = log::clock_line(pairs);
-  const auto poses = log::autopilot_poses(topics_of(theirs), clock);
+  const auto topics = read_or_fail(log::read_autopilots_log(theirs));
+  for (const auto& words : topics.loss.words()) say_error("backwash merge", theirs + ":1: " + words);
+  const auto poses = log::autopilot_poses(topics, clock);
   if (!poses) throw Failure(kBadData, theirs + ":1: " + poses.error());
   const double distance = of_this_flight(ours, theirs, log::distance_from_link(log, *poses));
   std::map<std::string, std::uint64_t> messages;
