@@ -33,8 +33,8 @@ tl::expected<std::string, FileError> read_file(const std::string& path, std::siz
 tl::expected<void, FileError> each_line(const std::string& path, std::size_t most_bytes, const std::string& wanted,
                                         const std::function<void(std::string_view)>& take);
 
-/// What gzip made this content of; content that gzip did not make, as it is. Error: damaged, cut short, or larger than
-/// `most_bytes` unpacked, of which no more than that is ever held.
+/// What gzip made this content of, or zip of one file; other content as it is. Error: damaged, cut short, several files
+/// in a zip, or larger than `most_bytes` unpacked, of which no more than that is ever held.
 tl::expected<std::string, std::string> unzipped(std::string content, std::size_t most_bytes);
 
 }  // namespace backwash::files

@@ -17,6 +17,7 @@
 #include "core/config/config.hpp"
 #include "core/config/simulation_terms.hpp"
 #include "core/files/read_file.hpp"
+#include "core/log/kinds/recording.hpp"
 #include "core/map/load_map.hpp"
 #include "core/plan/planner.hpp"
 
@@ -96,7 +97,7 @@ log::FlightLog read_table(const std::string& path, const std::string& time_colum
     if (path.ends_with(".bwlog") || path.ends_with(".mcap"))
       throw Failure(kBadData,
                     path + ":1: is no table but a recording of backwashd; make one of it with backwash export --csv");
-    if (path.ends_with(".ulg") || path.ends_with(".bin") || path.ends_with(".BIN"))
+    if (const auto kind = log::recording_of(path); kind && (*kind)->form == log::RecordingKind::Form::autopilot)
       throw Failure(kBadData, path + ":1: is no table but an autopilot's log; make one of it with backwash import");
   }
   throw Failure(table.error().kind == log::LogError::Kind::not_found ? kNoInput : kBadData, table.error().message);

@@ -36,7 +36,8 @@ printf 'start = [1, 0, 1]\n[[hover]]\np = [2, 0, 1]\ndwel = 3\n' >spec_key.toml
 printf 'start = [1, 1.5, 1]\n[[hover]]\np = [5, 1.5, 1]\ndwell = 3\n' >spec_wall.toml
 printf 'start = [1, 0, 1]\n[[hover]]\np = [1.2, 0, 1]\ndwell = 1\n' >spec_good.toml
 touch exists a.csv
-cp corrupt.bt corrupt.ulg
+printf 'ULog\x01\x12\x35\x01' >corrupt.ulg
+cp "$here/../data/ardupilot/door.bin" flight.bin
 cp corrupt.bt corrupt.bwlog
 mkfifo fifo
 # Column maps, and tables of others.
@@ -178,7 +179,7 @@ refused 65 "does not say which part" export begun.bwlog begun.bwlog --mcap none.
 printf '\x89MCAP0\r\n' >begun.mcap
 refused 65 "byte 8: no channel /backwash/raw_log" replay --log begun.mcap
 refused 64 "needs two logs" merge begun.bwlog -o both.mcap
-refused 64 "is no autopilot's log by its name" merge begun.bwlog begun.mcap -o both.mcap
+refused 64 "is no autopilot's log; give" merge begun.bwlog begun.mcap -o both.mcap
 refused 65 "no answer of the autopilot to TIMESYNC" merge begun.bwlog corrupt.ulg -o both.mcap
 refused 74 "cannot be written to its end" export begun.bwlog --mcap /dev/full --force
 # tables that no flight can be: gravity in the acceleration, heights downwards, an attitude without length

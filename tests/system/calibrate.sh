@@ -8,7 +8,7 @@ grid() { printf 'start = [0, 0, 1.0]\nstrength_sd = 0.35\n[grid]\nlow = %s\nhigh
 grid '[0, -0.7, 0.35]' '[0, 0.7, 2.2]' '[1, 3, 4]' >two.toml
 grid '[0, -1.7, 0.35]' '[0, 1.7, 2.2]' '[1, 3, 4]' >four.toml
 grid '[0, -0.1, 0.9]' '[0, 0.1, 1.0]' '[1, 3, 3]' >poor.toml
-for seed in 1 2; do
+for seed in 1 2 3; do
   "$backwash" simulate --map builtin:parallel-walls-2m --vehicle $quad --flight two.toml --seed $seed --out two$seed.csv >log
   "$backwash" simulate --map builtin:parallel-walls-4m --vehicle $quad --flight four.toml --seed $seed --out four$seed.csv >log
   "$backwash" simulate --map builtin:parallel-walls-4m --vehicle $quad --flight poor.toml --seed $seed --out poor$seed.csv >log
@@ -20,11 +20,11 @@ status=0
 "$backwash" calibrate --map builtin:parallel-walls-2m --log two1.csv two2.csv --vehicle $quad --out model.toml 2>stderr || status=$?
 [[ $status == 73 ]] || die "overwrites a model file, exit $status"
 status=0
-"$backwash" calibrate --map builtin:parallel-walls-4m --log poor1.csv poor2.csv poor1.csv --vehicle $quad --out none.toml --json \
+"$backwash" calibrate --map builtin:parallel-walls-4m --log poor1.csv poor2.csv poor3.csv --vehicle $quad --out none.toml --json \
   >refused.json 2>stderr || status=$?
 [[ $status == 65 && ! -e none.toml && $(wc -l <stderr) == 1 ]] || die "refusal: exit $status, $(cat stderr)"
 grep -q 'wall refused: no wall closer.*to determine it, hover' stderr || die "the refusal's line: $(cat stderr)"
-"$backwash" calibrate --map builtin:parallel-walls-4m --log poor1.csv poor2.csv poor1.csv --vehicle $quad --keep-base --bootstraps 20 --report kept.html >log 2>stderr ||
+"$backwash" calibrate --map builtin:parallel-walls-4m --log poor1.csv poor2.csv poor3.csv --vehicle $quad --keep-base --bootstraps 20 --report kept.html >log 2>stderr ||
   die "--keep-base: $(cat stderr)"
 # A model that no program reads is not written, and the key that is at fault is told.
 for log in two1 two2 four1 four2; do
@@ -82,8 +82,10 @@ done
 sed "s|^kp = .*|$(grep '^kp' proposed.toml)|; s|^kd = .*|$(grep '^kd' proposed.toml)|; s|^latency = .*|$(grep '^latency' proposed.toml)|; s|^attitude_lag = .*|$(grep '^attitude_lag' proposed.toml)|" other.toml >again.toml
 "$backwash" vehicle check --vehicle again.toml >log || die "what is proposed is no vehicle file"
 # One short log and one that excites nothing stop no fit of three others.
-head -n 250 around:1.csv >short.csv
+awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == "x_m") x = i } NR > 1 { $x += 0.01 } NR <= 250' around:1.csv >short.csv
 "$backwash" vehicle fit around:?.csv short.csv hover:4.csv --vehicle $quad --json >more.json 2>stderr || die "vehicle fit with a short log: $(cat stderr)"
+"$backwash" vehicle fit around:?.csv around:1.csv --vehicle $quad --json >/dev/null 2>twice || die "vehicle fit with a flight twice: $(cat twice)"
+grep -q 'around:1.csv:1: 100 % of the positions are those of around:1.csv: .*; left out' twice || die "twice: $(cat twice)"
 grep -q 'short.csv:1: holds less than 10 s in the air that can be used; left out' stderr && grep -q 'hover:4.csv does not excite .*; left out' stderr || die "not told: $(cat stderr)"
 python3 -c 'import json; few, more = json.load(open("keys.json")), json.load(open("more.json")); assert few["keys"] == more["keys"] and len(more["left_out"]) == 2'
 status=0

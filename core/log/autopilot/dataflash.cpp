@@ -99,52 +99,97 @@ Format format_of(const std::uint8_t* p) {
 
 class DataflashDecoder {
  public:
-  tl::expected<TopicLog, std::string> run(std::span<const std::uint8_t> bytes) {
-    bool formats = false, damaged = false;
-    for (std::size_t at = 0; at + kMessageHeader <= bytes.size();) {
-      const std::uint8_t* p = bytes.data() + at;
-      const std::uint8_t type = p[2];
-      const bool is_format = type == kFormat;
-      const std::size_t size = is_format ? kFormatSize : formats_[type].size;
-      if (p[0] != kHead[0] || p[1] != kHead[1] || size < kMessageHeader) {
-        if (!damaged) log_.dropouts += 1;
-        damaged = true;
-        at += 1;
+  explicit DataflashDecoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+
+  tl::expected<TopicLog, std::string> run() {
+    for (std::size_t at = 0; at < bytes_.size();) {
+      if (!stands(at)) {
+        at = past_damage(at);
         continue;
       }
-      if (at + size > bytes.size()) break;  // cut short
-      if (is_format) {
-        formats_[p[3]] = format_of(p);
-        formats = true;
-      } else if (formats_[type].timed)
-        data(formats_[type], p + kMessageHeader);
-      damaged = false;
+      const std::uint8_t* p = bytes_.data() + at;
+      const std::size_t size = size_at(at);
+      const Format& format = formats_[p[2]];
+      if (p[2] == kFormat) formats_[p[3]] = format_of(p);
+      if (p[2] == kFormat || !format.timed)
+        log_.loss.read(size);
+      else
+        believed(at) ? data(format, p) : log_.loss.skip(size);
       at += size;
     }
-    if (!formats) return tl::unexpected<std::string>("no format message (FMT); give a .bin file of ArduPilot");
+    if (std::ranges::none_of(formats_, [](const Format& f) { return f.size > 0; }))
+      return tl::unexpected<std::string>("no format message (FMT); give a .bin file of ArduPilot");
+    log_.drop_misplaced();
     return std::move(log_);
   }
 
  private:
+  /// Of the message whose header is at a byte; 0: none is, or its type has no format.
+  std::size_t size_at(std::size_t at) const {
+    if (at + kMessageHeader > bytes_.size() || bytes_[at] != kHead[0] || bytes_[at + 1] != kHead[1]) return 0;
+    return bytes_[at + 2] == kFormat ? kFormatSize : formats_[bytes_[at + 2]].size;
+  }
+
+  /// Whether a message is wholly there and another one begins where it ends, or the file ends there. Where bytes were
+  /// lost within it, what follows it is none: the format has no checksum.
+  bool stands(std::size_t at) const {
+    const std::size_t size = size_at(at), end = at + size;
+    if (size == 0 || end > bytes_.size()) return false;
+    if (bytes_[at + 2] == kFormat) {
+      const Format format = format_of(bytes_.data() + at);
+      const std::size_t known = formats_[bytes_[at + 3]].size;  // a second format of a type that is another is damage
+      if (format.name.empty() || format.size < kMessageHeader || (known > 0 && known != format.size)) return false;
+    }
+    const auto left = std::min(bytes_.size() - end, sizeof kHead);
+    return std::ranges::equal(bytes_.subspan(end, left), std::span(kHead).first(left));
+  }
+
+  /// Skips to the next message that stands; a last one that is cut short is told as such.
+  std::size_t past_damage(std::size_t at) {
+    std::size_t next = at + 1;
+    while (next < bytes_.size() && !stands(next)) ++next;
+    const bool cut = next == bytes_.size() && (next - at < kMessageHeader || at + size_at(at) > next);
+    cut ? log_.loss.cut(next - at) : log_.loss.skip(next - at);
+    return next;
+  }
+
+  double time_of(std::size_t at) const { return 1e-6 * *value_of('Q', bytes_.data() + at + kMessageHeader); }
+
+  /// Whether the time of a message is one of its neighbours'.
+  bool believed(std::size_t at) const {
+    const double t = time_of(at);
+    if (newest_s_ && std::abs(t - *newest_s_) < kNeighbours_s) return true;
+    for (std::size_t next = at + size_at(at); next < bytes_.size() && stands(next); next += size_at(next))
+      if (formats_[bytes_[next + 2]].timed) return std::abs(t - time_of(next)) < kNeighbours_s;
+    return !newest_s_;
+  }
+
   void data(const Format& format, const std::uint8_t* p) {
-    const unsigned instance = format.counted ? p[8] : 0;
+    const unsigned instance = format.counted ? p[kMessageHeader + 8] : 0;
     auto [found, is_new] = topics_.try_emplace({format.name, instance}, log_.topics.size());
     if (is_new) log_.topics.push_back({format.name, instance, {}, {}});
     auto& topic = log_.topics[found->second];
-    const double t = 1e-6 * *value_of('Q', p);
-    if (!topic.t_s.empty() && t < topic.t_s.back())
-      return void(log_.dropouts += 1);  // damage that looks like a message
+    const double t = time_of(static_cast<std::size_t>(p - bytes_.data()));
+    newest_s_ = t;
+    log_.loss.read(format.size, t);
     topic.t_s.push_back(t);
+    std::string name;
+    p += kMessageHeader;
     for (std::size_t k = 0; k < format.types.size(); ++k) {
       if (const auto value = value_of(format.types[k], p); value && k > 0) {
         auto& column = topic.columns[format.labels[k]];
         column.resize(topic.t_s.size() - 1, std::nan(""));
         column.push_back(*value);
+        if (format.name == "PARM" && format.labels[k] == "Value") log_.parameters[name] = *value;
       }
+      if (format.types[k] == 'N') name = text(p, size_of('N'));
+      if (format.name == "MSG" && format.types[k] == 'Z') log_.texts.push_back(text(p, size_of('Z')));
       p += size_of(format.types[k]);
     }
   }
 
+  std::span<const std::uint8_t> bytes_;
+  std::optional<double> newest_s_;
   std::array<Format, 256> formats_;
   std::map<std::pair<std::string, unsigned>, std::size_t> topics_;
   TopicLog log_;
@@ -153,7 +198,7 @@ class DataflashDecoder {
 }  // namespace
 
 tl::expected<TopicLog, std::string> decode_dataflash(std::span<const std::uint8_t> bytes) {
-  return DataflashDecoder().run(bytes);
+  return DataflashDecoder(bytes).run();
 }
 
 }  // namespace backwash::log

@@ -34,6 +34,15 @@ double FlightMark::shared(const FlightMark& other) const {
   return static_cast<double>(both) / static_cast<double>(fewer);
 }
 
+std::string KnownFlights::again(const std::string& name, FlightMark mark) {
+  for (const auto& [known, other] : known_)
+    if (const double shared = mark.shared(other); shared >= kSameFlight)
+      return name + ":1: " + std::to_string(static_cast<int>(100 * shared)) + " % of the positions are those of " +
+             known + ": the same flight under two names";
+  known_.emplace_back(name, std::move(mark));
+  return {};
+}
+
 std::vector<std::size_t> same_flights(const std::vector<FlightMark>& marks) {
   std::vector<std::pair<std::size_t, std::size_t>> places;  // hash, flight
   for (std::size_t f = 0; f < marks.size(); ++f)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -32,5 +33,15 @@ inline constexpr double kSameFlight = 0.5;
 /// Of each flight the first one before it that is the same flight and no other's, or its own number: what comparing
 /// each with all before it finds, in time that grows with the flights and with what they share.
 std::vector<std::size_t> same_flights(const std::vector<FlightMark>& marks);
+
+/// Flights that one call was given so far.
+class KnownFlights {
+ public:
+  /// Why a flight is one of them under another name, a sentence; empty: it is new, and one of them from now on.
+  std::string again(const std::string& name, FlightMark mark);
+
+ private:
+  std::vector<std::pair<std::string, FlightMark>> known_;
+};
 
 }  // namespace backwash::log

@@ -14,6 +14,7 @@ namespace backwash::log {
 struct FlightLog {
   std::vector<double> t_s;
   std::map<std::string, std::vector<double>> columns;  ///< name as in the file → one value per row
+  std::vector<std::string> notes = {};  ///< what its reader could not read or left out, and how much: a sentence each
   bool has(const std::string& name) const { return columns.contains(name); }
   const std::vector<double>& column(const std::string& name) const { return columns.at(name); }
 };

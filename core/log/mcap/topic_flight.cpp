@@ -6,8 +6,10 @@
 #include <optional>
 #include <span>
 
+#include "core/log/autopilot/airframe.hpp"
 #include "core/log/autopilot/turned_attitude.hpp"
 #include "core/log/mcap/topic_log.hpp"
+#include "core/types/formatted.hpp"
 #include "core/types/geometry.hpp"
 
 namespace backwash::log {
@@ -71,9 +73,16 @@ void join_motors(const TopicLog& topics, TopicRows& rows, FlightLog& log) {
   }
 }
 
+/// Messages a second, without the gaps: a log may hold two flights.
 double rate(const TopicLog::Topic& topic) {
-  const double span = topic.t_s.size() < 2 ? 0 : topic.t_s.back() - topic.t_s.front();
-  return span > 0 ? static_cast<double>(topic.t_s.size() - 1) / span : 0;
+  double steps = 0, span = 0;
+  for (std::size_t k = 1; k < topic.t_s.size(); ++k) {
+    const double step = topic.t_s[k] - topic.t_s[k - 1];
+    if (step > kMostApart) continue;
+    steps += 1;
+    span += step;
+  }
+  return span > 0 ? steps / span : 0;
 }
 
 /// The accelerometer's topic that was logged most often, and what its three columns are called without their index.
@@ -98,9 +107,11 @@ std::optional<std::pair<std::size_t, double>> between(const TopicLog::Topic& top
   return std::pair{k, (t - topic.t_s[k]) / h};
 }
 
-/// Whether the estimator set its position anew between message k and the next one.
+constexpr const char* kLeftOut = "left out";  // column: messages so far that are not valid
+
+/// Whether the estimator set its position anew between message k and the next one, or did not know it.
 bool reset_after(const TopicLog::Topic& position, std::size_t k) {
-  return std::ranges::any_of(std::array{"xy_reset_counter", "z_reset_counter"}, [&](const char* counter) {
+  return std::ranges::any_of(std::array{"xy_reset_counter", "z_reset_counter", kLeftOut}, [&](const char* counter) {
     const auto found = position.columns.find(counter);
     return found != position.columns.end() && found->second[k] != found->second[k + 1];
   });
@@ -206,13 +217,68 @@ FlightLog flight_of(const TopicLog& topics, const TopicLog::Topic& position) {
 
 }  // namespace
 
-tl::expected<FlightLog, std::string> flight_of(const TopicLog& topics) {
-  const auto* position = topics.find("vehicle_local_position");
-  if (!position) return tl::make_unexpected("no topic vehicle_local_position; log it, a flight needs positions");
+namespace {
+
+/// The messages whose position and velocity the estimator calls valid; `notes`: what is left out.
+TopicLog::Topic valid_ones(const TopicLog::Topic& position, std::vector<std::string>& notes) {
+  std::vector<char> valid(position.t_s.size(), 1);
+  for (const auto& [flag, what] : {std::pair{"xy_valid", "position along x and y"},
+                                   {"z_valid", "height"},
+                                   {"v_xy_valid", "velocity along x and y"},
+                                   {"v_z_valid", "vertical velocity"}}) {
+    const auto said = position.columns.find(flag);
+    if (said == position.columns.end()) continue;
+    std::size_t wrong = 0;
+    for (std::size_t k = 0; k < valid.size(); ++k) {
+      wrong += said->second[k] == 0 ? 1 : 0;
+      valid[k] = valid[k] != 0 && said->second[k] != 0 ? 1 : 0;
+    }
+    if (wrong > 0)
+      notes.push_back(
+          formatted("its %s is not valid in %.3g %% of the messages, as its estimator says (%s; "
+                    "ArduPilot: SS of XKF4 or NKF4)",
+                    what, 100.0 * static_cast<double>(wrong) / static_cast<double>(valid.size()), flag));
+  }
+  TopicLog::Topic kept{position.name, position.instance, {}, {}};
+  double left_out = 0;
+  for (std::size_t k = 0; k < valid.size(); ++k) {
+    if (valid[k] == 0) {
+      left_out += 1;
+      continue;
+    }
+    kept.t_s.push_back(position.t_s[k]);
+    kept.columns[kLeftOut].push_back(left_out);
+    for (const auto& [name, column] : position.columns) kept.columns[name].push_back(column[k]);
+  }
+  return kept;
+}
+
+tl::expected<FlightLog, std::string> whole_flight(const TopicLog& topics) {
+  const auto* logged = topics.find("vehicle_local_position");
+  if (!logged) return tl::make_unexpected("no topic vehicle_local_position; log it, a flight needs positions");
+  const auto frame = airframe_of(topics);
+  if (!frame.other.empty())
+    return tl::make_unexpected("is the log of " + frame.other + "; all here is about multicopters, give one's");
+  std::vector<std::string> notes;
+  const auto valid = valid_ones(*logged, notes);
+  const auto* position = &valid;
+  if (valid.t_s.empty()) return tl::make_unexpected(notes.front() + ": nothing is left");
   const auto dense = rate(*position) < kLeastRate ? densified(topics, *position) : std::nullopt;
   FlightLog log = flight_of(topics, dense && dense->t_s.size() > position->t_s.size() ? *dense : *position);
+  log.notes = std::move(notes);
+  if (frame.rotors != 4 && std::erase_if(log.columns, [](const auto& c) { return c.first.starts_with("motor"); }) > 0)
+    log.notes.push_back(
+        formatted("it has %d rotors: its motors are left out, for those of four alone are tested", frame.rotors));
   for (const char* name : {"x_m", "y_m", "z_m"})
     if (!log.has(name)) return tl::make_unexpected("vehicle_local_position has no finite x, y, z");
+  return log;
+}
+
+}  // namespace
+
+tl::expected<FlightLog, std::string> flight_of(const TopicLog& topics) {
+  auto log = whole_flight(topics);
+  for (const auto& words : topics.loss.words()) log ? log->notes.push_back(words) : void(log.error() += "; " + words);
   return log;
 }
 

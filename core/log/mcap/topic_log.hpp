@@ -8,6 +8,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "core/log/autopilot/log_loss.hpp"
 #include "core/log/columns/flight_log.hpp"
 
 namespace backwash::log {
@@ -22,8 +23,13 @@ struct TopicLog {
     std::map<std::string, std::vector<double>> columns;  ///< field → one value per message
   };
   std::vector<Topic> topics;
-  std::size_t dropouts = 0;
+  std::map<std::string, double> parameters = {};  ///< the autopilot's, by name, as they were last
+  std::vector<std::string> texts = {};            ///< what the autopilot said of itself
+  LogLoss loss = {};                              ///< of the file
   const Topic* find(const std::string& name, unsigned instance = 0) const;
+  /// Takes out of each topic the fewest messages without which its times never fall, damage that looks like messages,
+  /// and counts them as lost.
+  void drop_misplaced();
 };
 
 /// A flight log (docs/interfaces.md) of a decoded one: vehicle_local_position, vehicle_attitude, trajectory_setpoint,
@@ -32,8 +38,12 @@ struct TopicLog {
 /// position. If those are rarer than 20 Hz, rows are the accelerometer's (vehicle_acceleration or sensor_combined;
 /// means down to 100 Hz), positions a cubic between messages, and accelerations the specific force turned by the
 /// attitude; a gap of positions above 0.5 s, and a reset of the estimator, is one of the rows. Other topics are joined
-/// by their latest value before, and left out where they are missing. Error: the topic that is missing.
+/// by their latest value before, and left out where they are missing. What is lost or left out stands in the log's
+/// notes. Error: the topic that is missing, and what of the file is lost.
 tl::expected<FlightLog, std::string> flight_of(const TopicLog& topics);
+
+/// The content of an autopilot's log, unpacked. Errors: not_found, bad_data.
+tl::expected<std::string, LogError> read_topic_file(const std::string& path, const std::string& wanted);
 
 /// Reads a file, decodes it and makes its flight log. `wanted`: what the path should name. Errors: not_found; bad_data
 /// with what the decoder says, or the topic that is missing.

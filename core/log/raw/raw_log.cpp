@@ -66,8 +66,11 @@ tl::expected<RawLog, LogError> raw_log_of(const std::string& path, const std::st
 }  // namespace
 
 tl::expected<RawLog, LogError> read_raw_log(const std::string& path) {
-  const auto content = read_log_file(path, files::kLargestLog, "a raw log");
-  return content ? raw_log_of(path, *content) : tl::unexpected(content.error());
+  auto content = read_log_file(path, files::kLargestLog, "a raw log");
+  if (!content) return tl::unexpected(content.error());
+  const auto plain = files::unzipped(std::move(*content), files::kLargestLog);
+  return plain ? raw_log_of(path, *plain)
+               : tl::unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + plain.error()});
 }
 
 std::optional<PartRecord> part_of(const std::string& path) {

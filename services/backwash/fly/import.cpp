@@ -4,13 +4,10 @@
 #include <functional>
 #include <utility>
 
-#include "core/log/autopilot/dataflash.hpp"
 #include "core/log/autopilot/same_flight.hpp"
-#include "core/log/autopilot/ulog.hpp"
-#include "core/log/columns/import_airgarage.hpp"
 #include "core/log/columns/import_columns.hpp"
-#include "core/log/columns/import_crazypad.hpp"
 #include "core/log/columns/labels.hpp"
+#include "core/log/kinds/recording.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/site/column_map.hpp"
@@ -23,45 +20,40 @@ namespace {
 using Importer = std::function<tl::expected<log::FlightLog, log::LogError>(const std::string& path,
                                                                            std::vector<std::string>& notes)>;
 
-/// Kinds of recordings; add a line for a new one.
-constexpr struct {
-  const char* kind;
-  tl::expected<log::FlightLog, log::LogError> (*import)(const std::string& path);
-} kImporters[] = {
-    {"airgarage", log::import_airgarage},
-    {"ardupilot", log::read_dataflash},
-    {"crazypad", log::import_crazypad},
-    {"ulog", log::read_ulog},
-};
-
 struct ImportOptions {
   std::string kind, folder, map_columns, columns, labels;
   std::vector<std::string> files;  ///< after `kind`, which is the first of them with a column map
   bool propose = false, json = false, force = false;
 };
 
-Importer importer(const std::string& kind) {
+/// The kind of recordings that a first word names; none: it is a file, and each of them says itself what it is.
+const log::RecordingKind* kind_of(const ImportOptions& options) {
   std::string known;
-  for (const auto& entry : kImporters) {
-    if (kind == entry.kind) return [import = entry.import](const std::string& path, auto&) { return import(path); };
-    known += (known.empty() ? "" : ", ") + std::string(entry.kind);
+  for (const auto& entry : log::importable_recordings()) {
+    if (options.kind == entry.name) return &entry;
+    known += (known.empty() ? "" : ", ") + std::string(entry.name);
   }
-  throw Failure(kUsage, "'" + kind + "' is no kind of recording; known are " + known);
+  std::error_code unknown;
+  if (std::filesystem::exists(options.kind, unknown) || options.kind.find_first_of("./") != std::string::npos)
+    return nullptr;
+  throw Failure(kUsage, "'" + options.kind + "' is no kind of recording; known are " + known + "; nor is it a file");
 }
 
 /// The importer that the options name, and the recordings.
 std::pair<Importer, std::vector<std::string>> importer_of(const ImportOptions& options) {
+  std::vector<std::string> files{options.kind};
+  files.insert(files.end(), options.files.begin(), options.files.end());
   if (options.map_columns.empty()) {
-    auto import = importer(options.kind);
-    if (options.files.empty()) throw Failure(kUsage, "no recording given after the kind '" + options.kind + "'");
-    return {std::move(import), options.files};
+    const auto* kind = kind_of(options);
+    if (kind && options.files.empty())
+      throw Failure(kUsage, "no recording given after the kind '" + options.kind + "'");
+    const auto read = kind ? kind->read : log::read_recording;
+    return {[read](const std::string& path, auto&) { return read(path); }, kind ? options.files : files};
   }
   const auto map = read_column_map(options.map_columns);
   if (!map)
     throw Failure(map.error().kind == config::ConfigError::Kind::not_found ? kNoInput : kConfiguration,
                   map.error().message);
-  std::vector<std::string> files{options.kind};
-  files.insert(files.end(), options.files.begin(), options.files.end());
   return {[map = *map](const std::string& path, auto& notes) { return log::import_columns(path, map, &notes); }, files};
 }
 
@@ -77,15 +69,6 @@ int propose(const ImportOptions& options) {
   if (!text) fail(text.error());
   std::fputs(text->c_str(), stdout);
   return kOk;
-}
-
-/// Which flight this is already known as; empty: none.
-std::string known_as(const log::FlightMark& mark, const std::vector<std::pair<std::string, log::FlightMark>>& known) {
-  for (const auto& [name, other] : known)
-    if (const double shared = mark.shared(other); shared >= log::kSameFlight)
-      return std::to_string(static_cast<int>(100 * shared)) + " % of the positions are those of " + name +
-             ": the same flight under two names";
-  return {};
 }
 
 /// FOLDER/NAME.csv; of NAME.csv.gz as well.
@@ -123,7 +106,7 @@ int run(const ImportOptions& options) {
   check_outputs(targets, options.force);
   const auto labels = labels_of(options);
   Json logs = Json::array(), refused = Json::array();
-  std::vector<std::pair<std::string, log::FlightMark>> known;
+  log::KnownFlights known;
   std::vector<std::string> notes;
   for (const auto& file : files) {
     auto log = read(file, notes);
@@ -133,19 +116,20 @@ int run(const ImportOptions& options) {
       refused.push_back(log.error().message);
       continue;
     }
-    log::FlightMark mark(*log);
-    if (const auto same = known_as(mark, known); !same.empty()) {
-      refused.push_back(file + ":1: " + same);
+    for (const auto& note : log->notes) notes.push_back(file + ": " + note);
+    if (const auto same = known.again(file, log::FlightMark(*log)); !same.empty()) {
+      refused.push_back(same);
       continue;
     }
-    known.emplace_back(file, std::move(mark));
     add_labels(*log, labels, options.labels, file, notes);
     write_log(target(options.folder, file), *log, options.force);
     logs.push_back(Json{{"log", target(options.folder, file)}, {"rows", log->t_s.size()}});
   }
   if (logs.empty()) throw Failure(kBadData, refused.front().get<std::string>());
   if (options.json) {
-    print(Json{{"kind", options.map_columns.empty() ? options.kind : "columns"},
+    print(Json{{"kind", !options.map_columns.empty() ? "columns"
+                        : files == options.files     ? options.kind
+                                                     : "by content"},
                {"logs", logs},
                {"refused", refused},
                {"notes", notes}});
@@ -162,7 +146,9 @@ int run(const ImportOptions& options) {
 Verb import_verb(Command& app) {
   auto options = std::make_shared<ImportOptions>();
   auto& command = app.add_subcommand("import", "Recordings of others as flight logs");
-  command.add_option("kind", options->kind, "airgarage, ardupilot (.bin), crazypad or ulog; left out with a column map")
+  command
+      .add_option("kind", options->kind,
+                  "airgarage, ardupilot, crazypad, flight-log, mcap or ulog; left out, each file says what it is")
       .required();
   command.add_option("files", options->files, "recordings");
   command.add_option("-o,--out", options->folder, "folder for the flight logs, one CSV each");
@@ -176,7 +162,8 @@ Verb import_verb(Command& app) {
   command.add_flag("--json", options->json, "one JSON object on stdout");
   command.add_flag("--force", options->force, "overwrite logs that exist");
   command.footer(
-      "Example:\n  backwash import airgarage 20240823_16_23_49.csv -o logs\n"
+      "Kinds are known by content; names, .gz and .zip do not matter.\n"
+      "Example:\n  backwash import flight.ulg 20240823_16_23_49.csv.gz -o logs\n"
       "  backwash import --propose flight.csv > map.toml\n  backwash import --map-columns map.toml flight*.csv -o "
       "logs");
   return {&command, [options] { return run(*options); }};

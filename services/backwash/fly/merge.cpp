@@ -3,13 +3,12 @@
 #include <cstdio>
 
 #include "core/log/autopilot/autopilot_flight.hpp"
-#include "core/log/autopilot/dataflash.hpp"
-#include "core/log/autopilot/ulog.hpp"
+#include "core/log/kinds/recording.hpp"
 #include "core/log/mcap/mcap_flight.hpp"
-#include "core/log/raw/log_file.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/learn/study_flights.hpp"
+#include "services/command_line/words.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
@@ -20,15 +19,6 @@ struct MergeOptions {
   std::string out;
   bool json = false, force = false;
 };
-
-log::TopicLog topics_of(const std::string& path) {
-  const auto content = read_or_fail(log::read_log_file(path, files::kLargestTable, "an autopilot's log"));
-  const std::span bytes(reinterpret_cast<const std::uint8_t*>(content.data()), content.size());
-  const bool ulog = path.ends_with(".ulg");
-  auto topics = ulog ? log::decode_ulog(bytes) : log::decode_dataflash(bytes);
-  if (!topics) throw Failure(kBadData, path + ":1: " + topics.error());
-  return ulog ? std::move(*topics) : log::px4_names(*topics);
-}
 
 /// The distance of its poses from what was told, where they are those of this flight: the clocks count from each start
 /// of the autopilot, and by them alone any of its logs fits somewhere.
@@ -47,7 +37,7 @@ int run(const MergeOptions& options) {
   if (options.logs.size() < 2) throw Failure(kUsage, "needs two logs: that of backwashd, then the autopilot's");
   const std::string &ours = options.logs.front(), &theirs = options.logs.back();
   if (!is_autopilots_log(theirs))
-    throw Failure(kUsage, theirs + " is no autopilot's log by its name; give a .ulg or .bin last");
+    throw Failure(kUsage, theirs + " is no autopilot's log; give PX4's or ArduPilot's own last");
   check_output(options.out, options.force);
   progress("reading the logs");
   const auto log = read_or_fail(log::read_raw_logs(std::span(options.logs).first(options.logs.size() - 1)));
@@ -55,7 +45,9 @@ int run(const MergeOptions& options) {
   if (pairs.empty())
     throw Failure(kBadData, ours + ":1: holds no answer of the autopilot to TIMESYNC: the clocks cannot be compared");
   const auto clock = log::clock_line(pairs);
-  const auto poses = log::autopilot_poses(topics_of(theirs), clock);
+  const auto topics = read_or_fail(log::read_autopilots_log(theirs));
+  for (const auto& words : topics.loss.words()) say_error("backwash merge", theirs + ":1: " + words);
+  const auto poses = log::autopilot_poses(topics, clock);
   if (!poses) throw Failure(kBadData, theirs + ":1: " + poses.error());
   const double distance = of_this_flight(ours, theirs, log::distance_from_link(log, *poses));
   std::map<std::string, std::uint64_t> messages;

@@ -3,8 +3,10 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/fly/flight_story_output.hpp"
 #include "services/backwash/fly/log_parts.hpp"
+#include "services/backwash/fly/raw_report.hpp"
 #include "services/backwash/fly/story_page.hpp"
 #include "services/backwash/json.hpp"
+#include "services/backwash/learn/study_flights.hpp"
 #include "services/backwash/page_parts.hpp"
 #include "services/backwash/site/world_cache.hpp"
 #include "services/backwash/verb.hpp"
@@ -49,6 +51,9 @@ std::optional<log::FlightLog> read_truth(const std::string& path) {
 }
 
 int run(const ReportOptions& options) {
+  if (is_autopilots_log(options.log()))
+    return report_of_autopilots_log(options.log(), options.vehicle == ReportOptions{}.vehicle ? "" : options.vehicle,
+                                    options.out, options.json, options.force);
   check_output(options.out, options.force);
   const auto vehicle = read_both(options.vehicle, options.model, options.risk).first;
   const auto log = read_or_fail(log::read_raw_logs(with_later_parts(options.logs)));
@@ -68,7 +73,7 @@ Verb report_verb(Command& app) {
   command
       .add_option("logs,--log", options->logs,
                   "raw log of backwashd, or parts of one in their order; of one file the later parts in its folder are "
-                  "read too")
+                  "read too. Or a log of PX4 or ArduPilot: what it says, and what can be asked of it")
       .required();
   command.add_option("--truth", options->truth,
                      "log of the truth by backwash-bench, CSV; without it measured positions are judged");

@@ -17,7 +17,8 @@ namespace backwash::services {
 namespace {
 
 log::FlightLog read(const std::string& path) {
-  auto log = read_flight(path);
+  LogNotes notes{"backwash adapt", {}, {}, {}};
+  auto log = read_told(path, notes);
   for (const std::string prefix : {"", "v", "cmd_"}) {
     const std::string unit = prefix == "v" ? "_mps" : "_m";
     if (!log::has_xyz(log, prefix, unit))

@@ -85,8 +85,10 @@ void read_logs(const CampaignFiles& files, const std::vector<map::OccupancyGrid>
   study::WindowOptions options;
   options.tau_w = gates.bound.tau_w;
   if (mapless) options = mapless_windows(gates);
+  log::KnownFlights known;
   each_readable(files, notes, [&](const std::string& path, std::size_t place) {
-    const auto log = read_flight(path);
+    const auto log = read_told(path, notes);
+    if (const auto same = known.again(path, log::FlightMark(log)); !same.empty()) throw Failure(kBadData, same);
     auto flight = study::flight_windows(log, vehicle, options, path);
     if (!flight) throw Failure(kBadData, flight.error().message);
     if (!mapless)

@@ -7,9 +7,8 @@
 #include <numeric>
 #include <utility>
 
-#include "core/log/autopilot/dataflash.hpp"
-#include "core/log/autopilot/ulog.hpp"
 #include "core/log/columns/import_columns.hpp"
+#include "core/log/kinds/recording.hpp"
 #include "core/log/raw/raw_flight.hpp"
 #include "core/study/windows/observer.hpp"
 #include "core/study/windows/signals/same_gusts.hpp"
@@ -41,17 +40,24 @@ void leave_out(Flights& flights, const std::vector<std::pair<std::size_t, std::s
 }  // namespace
 
 bool is_autopilots_log(const std::string& path) {
-  return path.ends_with(".ulg") || path.ends_with(".bin") || path.ends_with(".BIN");
+  const auto kind = log::recording_of(path);
+  return kind && (*kind)->form == log::RecordingKind::Form::autopilot;
 }
 
 log::FlightLog read_flight(const std::string& path) {
-  if (log::is_raw_log(path)) return read_or_fail(log::flight_of_raw_log(read_or_fail(log::read_raw_log(path)), path));
-  if (!is_autopilots_log(path)) return read_table(path, "t_s");
-  return read_or_fail(path.ends_with(".ulg") ? log::read_ulog(path) : log::read_dataflash(path));
+  const auto* kind = read_or_fail(log::recording_of(path));
+  if (kind->form == log::RecordingKind::Form::table) return read_table(path, "t_s");
+  return read_or_fail(log::read_recording(path));
+}
+
+log::FlightLog read_told(const std::string& path, LogNotes& notes) {
+  auto log = read_flight(path);
+  for (const auto& what : log.notes) notes.column(path, what);
+  return log;
 }
 
 log::FlightLog read_studied(const std::string& path, LogNotes& notes) {
-  auto log = read_flight(path);
+  auto log = read_told(path, notes);
   for (const char* name : {"x_m", "y_m", "z_m"})
     if (!log.has(name))
       throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");

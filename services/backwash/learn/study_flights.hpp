@@ -17,11 +17,13 @@
 
 namespace backwash::services {
 
-/// PX4's or ArduPilot's own log, by its name.
+/// PX4's or ArduPilot's own log, by its content.
 bool is_autopilots_log(const std::string& path);
 
-/// A flight log: ULog (.ulg) or DataFlash (.bin) by its name, else CSV. Throws Failure.
+/// A flight log of any kind that its content says (log::recording_of). Throws Failure.
 log::FlightLog read_flight(const std::string& path);
+/// The same; `notes` tell what its reader could not read or left out.
+log::FlightLog read_told(const std::string& path, LogNotes& notes);
 
 /// The same for a study, which needs positions: without the columns of sensors that never spoke, and without those of a
 /// table that the others contradict (core/log, leave_out_doubted()), which `notes` then tell. Throws Failure.

@@ -9,9 +9,10 @@
 #include "core/files/read_file.hpp"
 #include "core/log/raw/raw_log.hpp"
 #include "core/plan/world/gain_sweep.hpp"
-#include "firmware_bridge/autopilots/profile.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
+#include "services/backwash/plan/firmware_gains.hpp"
+#include "services/backwash/plan/logged_vehicle.hpp"
 #include "services/backwash/plan/vehicle_file.hpp"
 #include "services/backwash/plan/vehicle_fit.hpp"
 #include "services/backwash/verb.hpp"
@@ -26,24 +27,6 @@ struct VehicleOptions {
 };
 
 using firmware_bridge::Ask;
-
-/// Whose gains are tuned, what it says of them, and which could not be taken. k_d is the velocity gain, k_p the product
-/// of the two (Ask).
-struct Firmware {
-  const firmware_bridge::AutopilotProfile* autopilot = &firmware_bridge::kPx4;
-  std::map<std::string, double> values;
-  std::string left_out;
-
-  /// Its parameter's name in these values, or the newest; empty where it has none for that.
-  std::string name(Ask ask) const {
-    std::string name;
-    for (const auto& rule : autopilot->rules)
-      if (rule.ask == ask)
-        for (std::size_t n = 0; n < rule.count(); ++n)
-          if (name = rule.names[n].name; values.contains(name)) return name;
-    return name;
-  }
-};
 
 /// NAME and number of each line of a parameter file: ArduPilot's (NAME,1 or NAME 1), PX4's (NAME=1), or a ground
 /// station's with NAME and value in the third and fourth column.
@@ -62,52 +45,6 @@ std::map<std::string, double> read_parameters(const std::string& path) {
     if (!name.empty() && name[0] != '#' && words >> value) values[name] = value;
   }
   return values;
-}
-
-/// Integral gains that fly, both of them or neither: along z the file's where no parameter is it. What is left out.
-std::string take_integrals(const Firmware& firmware, Vehicle& vehicle) {
-  auto& own = vehicle.controller.velocity_integrator;
-  const auto gain = [&](Ask ask, double without) {
-    const auto found = firmware.values.find(firmware.name(ask));
-    return found == firmware.values.end() ? without : found->second;
-  };
-  const Vehicle::HorizontalVertical flown{gain(Ask::k_i_horizontal, own.horizontal),
-                                          gain(Ask::k_i_vertical, own.vertical)};
-  if ((flown.horizontal > 0) == (flown.vertical > 0)) {
-    own = flown;
-    return "";
-  }
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", flown.horizontal);
-  return firmware.name(Ask::k_i_horizontal) + " " + text + " is left out: along z controller.velocity_integrator is " +
-         (flown.vertical > 0 ? "not 0" : "0") + ", and both integrate or neither does";
-}
-
-/// The gains that fly, in place of the vehicle file's.
-Firmware take_gains(const std::string& path, Vehicle& vehicle) {
-  Firmware firmware{nullptr, read_parameters(path), {}};
-  std::string tried;
-  for (const auto* autopilot : firmware_bridge::autopilots()) {
-    firmware.autopilot = autopilot;
-    const std::string velocity = firmware.name(Ask::k_d_horizontal);
-    if (!firmware.values.contains(velocity)) {
-      if (!velocity.empty()) tried += (tried.empty() ? "" : " nor ") + velocity;
-      continue;
-    }
-    const auto gain = [&](Ask ask) {
-      const auto found = firmware.values.find(firmware.name(ask));
-      if (found == firmware.values.end() || !(found->second > 0))
-        throw Failure(kBadData, path + ":1: " + firmware.name(ask) +
-                                    " is missing or not above 0; save all parameters of the autopilot");
-      return found->second;
-    };
-    vehicle.controller.kd = {gain(Ask::k_d_horizontal), gain(Ask::k_d_vertical)};
-    vehicle.controller.kp = {gain(Ask::k_p_horizontal) * gain(Ask::k_d_horizontal),
-                             gain(Ask::k_p_vertical) * gain(Ask::k_d_vertical)};
-    firmware.left_out = take_integrals(firmware, vehicle);
-    return firmware;
-  }
-  throw Failure(kBadData, path + ":1: has neither " + tried + "; save all parameters of the autopilot");
 }
 
 /// Samples of a flight with the present gains, and how many of them lay in their set.
@@ -194,7 +131,8 @@ int run(const VehicleOptions& options) {
   auto vehicle = read_vehicle(options.vehicle);
   const auto model = read_model(options.model);
   Firmware firmware;
-  if (!options.parameters.empty()) firmware = take_gains(options.parameters, vehicle);
+  if (!options.parameters.empty())
+    firmware = take_gains(read_parameters(options.parameters), options.parameters, vehicle);
   std::optional<TuningEvidence> evidence;
   if (!options.log.empty()) evidence = evidence_of(options.log);
   read_reachability(vehicle, reach::Method::tight, reach::Loop::vehicle, options.vehicle);
@@ -242,10 +180,12 @@ Verb vehicle_verb(Command& app) {
       "follows:\nmeasure controller.attitude_lag and feedback_delay first.\nExample:\n"
       "  backwash vehicle tune --map builtin:apartment --model builtin:quad-5in --vehicle builtin:quad-5in \\\n"
       "    --start 3,4.2,1.2 --goal 7.4,3,1.2");
-  const Verb printed = vehicle_print_verb(group), checked = vehicle_check_verb(group), fit = vehicle_fit_verb(group);
-  return {&group, [options, printed, checked, fit] {
+  const Verb printed = vehicle_print_verb(group), checked = vehicle_check_verb(group), fit = vehicle_fit_verb(group),
+             from = vehicle_from_verb(group);
+  return {&group, [options, printed, checked, fit, from] {
             if (printed.command->parsed()) return printed.run();
             if (fit.command->parsed()) return fit.run();
+            if (from.command->parsed()) return from.run();
             return checked.command->parsed() ? checked.run() : run(*options);
           }};
 }

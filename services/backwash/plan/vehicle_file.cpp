@@ -36,12 +36,6 @@ int print_file(const VehicleFileOptions& options) {
   return kOk;
 }
 
-/// The thrust command u of the hover: f u² + (1 − f) u = share of the full thrust.
-double hover_command(const Vehicle& v) {
-  const double f = v.propulsion.thr_mdl_fac, share = v.body.mass * kGravity / v.propulsion.max_thrust;
-  return f < 1e-9 ? share : (std::sqrt((1 - f) * (1 - f) + 4 * f * share) - (1 - f)) / (2 * f);
-}
-
 double damping(double kp, double kd) { return kd / (2 * std::sqrt(kp)); }
 
 int check_file(const VehicleFileOptions& options) {
@@ -86,6 +80,11 @@ int check_file(const VehicleFileOptions& options) {
 }
 
 }  // namespace
+
+double hover_command(const Vehicle& v) {
+  const double f = v.propulsion.thr_mdl_fac, share = v.body.mass * kGravity / v.propulsion.max_thrust;
+  return f < 1e-9 ? share : (std::sqrt((1 - f) * (1 - f) + 4 * f * share) - (1 - f)) / (2 * f);
+}
 
 Verb vehicle_print_verb(Command& group) {
   const auto options = std::make_shared<VehicleFileOptions>();

@@ -135,9 +135,12 @@ int fit_vehicle(const VehicleFitOptions& options) {
   std::deque<log::FlightLog> logs;
   std::vector<LoopLog> named;
   LogNotes notes{"backwash vehicle fit", {}, {}, {}};
+  log::KnownFlights known;
   each_readable(options.logs, notes, [&](const std::string& path) {
     progress("reading " + path);
-    logs.push_back(read_studied(path, notes));
+    auto log = read_studied(path, notes);
+    if (const auto same = known.again(path, log::FlightMark(log)); !same.empty()) throw Failure(kBadData, same);
+    logs.push_back(std::move(log));
     named.push_back({path, &logs.back()});
   });
   progress("fitting the loop");
