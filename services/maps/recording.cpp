@@ -155,8 +155,9 @@ class Recording {
     out_.taken += out_.points.size() + out_.no_returns + own_;
     if (!rays_) {
       out_.sensors.clear();
-      out_.notes.push_back("the clouds are in " + shown(root_) +
-                           " and nothing says where they were seen from: no ray frees anything");
+      out_.notes.push_back(
+          "the clouds are in " + shown(root_) +
+          " and nothing says where they were seen from: no ray frees anything, no point is the vehicle's");
     }
     if (left_out_ > 0)
       out_.notes.push_back(std::to_string(left_out_) + " of " + std::to_string(clouds_.size()) +
