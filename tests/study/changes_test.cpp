@@ -79,6 +79,20 @@ TEST(Divisions, FindTheFlightsWhetherTheyFollowEachOtherOrNot) {
   }
 }
 
+/// It has no scatter of its own, wherever it was flown.
+TEST(Divisions, OneFlightAloneIsNone) {
+  for (std::size_t odd = 0; odd < 12; ++odd) {
+    std::vector<double> values(12, 0.0);
+    for (std::size_t f = 0; f < values.size(); ++f) values[f] = f == odd ? 1 : 0.001 * static_cast<double>(f % 3);
+    for (const auto& d : divisions(values_of(values)))
+      for (const auto& row : d.profile.rowwise())
+        if (d.when != When::growing) {
+          EXPECT_GE(row.sum(), 2) << odd;
+          EXPECT_LE(row.sum(), 10) << odd;
+        }
+  }
+}
+
 TEST(Divisions, TwoStepsAreTwoOnlyIfEachIsClear) {
   std::mt19937 rng(4);
   std::normal_distribution<double> scatter(0, 0.01);
