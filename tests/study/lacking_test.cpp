@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "core/study/effects/columns.hpp"
 #include "core/study/effects/table.hpp"
 #include "core/study/findings/when_it_acts.hpp"
 #include "tests/study_worlds/observe.hpp"
@@ -100,19 +99,7 @@ TEST(Lacking, MotorCommandsInSomeFlightsAreAGapInTheOthers) {
   const auto gaps = not_measured(seen);
   ASSERT_EQ(gaps.size(), 2u);
   EXPECT_EQ(gaps[1].flights, (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
-  EXPECT_EQ(to_text(gaps[1], seen.flights), "rpm over command: not measured up to flight 6, asked in the others");
-}
-
-/// Each flight is short of its own thrust: that of others may have carried another mass.
-TEST(Lacking, AMassIsMissingThrustOfItsOwnFlight) {
-  Windows windows(6);
-  for (std::size_t i = 0; i < windows.size(); ++i) {
-    windows[i].flight = i / 3;
-    windows[i].thrust_acc = i < 3 ? 9.0 + static_cast<double>(i) : 12.0;
-  }
-  const auto column = missing_thrust(windows, 0);
-  const std::vector<double> expected{-10, -10, -10, -12, -12, -12};
-  EXPECT_EQ(column.parts.front().x, expected);
+  EXPECT_EQ(to_text(gaps[1], seen.flights), "rpm over command, not measured in all flights; without: up to flight 6");
 }
 
 }  // namespace

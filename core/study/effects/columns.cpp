@@ -2,7 +2,6 @@
 #include "core/study/effects/columns.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace backwash::study {
 
@@ -22,24 +21,18 @@ std::vector<DesignColumn> body_drift(const Windows& ws, const std::function<doub
 
 namespace {
 
-/// T/m of each window's flight: a window's own answers its mean gust, so it would explain the residual by itself, and
-/// other flights may have flown with another mass.
-std::vector<double> flight_thrusts(const Windows& ws) {
-  std::vector<double> thrust_acc(ws.size());
-  for (std::size_t begin = 0, end = 0; begin < ws.size(); begin = end) {
-    double sum = 0;
-    for (; end < ws.size() && ws[end].flight == ws[begin].flight; ++end) sum += ws[end].thrust_acc;
-    for (std::size_t i = begin; i < end; ++i) thrust_acc[i] = sum / static_cast<double>(end - begin);
-  }
+/// T/m of all windows together: a window's own answers its mean gust, so it would explain the residual by itself.
+double mean_thrust(const Windows& ws) {
+  double thrust_acc = 0;
+  for (const auto& w : ws) thrust_acc += w.thrust_acc / static_cast<double>(ws.size());
   return thrust_acc;
 }
 
 }  // namespace
 
 DesignColumn missing_thrust(const Windows& ws, const std::function<double(const WindowRow&)>& share) {
-  std::vector<double> missing = flight_thrusts(ws);
-  for (std::size_t i = 0; i < ws.size(); ++i) missing[i] *= -share(ws[i]);
-  return {{{kMeanZ, std::move(missing)},
+  const double thrust_acc = mean_thrust(ws);
+  return {{{kMeanZ, values(ws, [&](auto& w) { return -share(w) * thrust_acc; })},
            {kThrustDelay, values(ws, [&](auto& w) { return -share(w) * w.delay_gain[1]; })},
            {kThrustSlope, values(ws, [&](auto& w) { return -share(w) * w.slope_gain[1]; })}}};
 }
@@ -47,23 +40,19 @@ DesignColumn missing_thrust(const Windows& ws, const std::function<double(const 
 DesignColumn missing_thrust(const Windows& ws, double m) {
   DesignColumn column = missing_thrust(ws, [](auto&) { return 1.0; });
   // To be met, what the set-points ask for was commanded as much more as the hover's thrust was.
-  std::vector<double> more = flight_thrusts(ws);
-  for (double& x : more) x /= kGravity;
-  const auto of_each = [&](auto value) {
-    std::vector<double> x(ws.size(), 0);
-    for (std::size_t i = 0; i < ws.size(); ++i)
-      if (ws[i].led) x[i] = value(ws[i], more[i]);
-    return x;
-  };
+  const double more = mean_thrust(ws) / kGravity;
   for (Eigen::Index axis = 0; axis < 3 && m != 0; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     if (axis < 2)
       column.parts.push_back({static_cast<Channel>(kMeanX + a),
-                              of_each([&](auto& w, double x) { return -x * w.led->asked_W[axis]; }), true});
-    column.parts.push_back({kVariances[a], of_each([&](auto& w, double x) {
-                              return std::log1p(std::pow(m * x, 2) * w.led->asked2[axis] / w.sigma[axis]) / m;
-                            }),
-                            true});
+                              values(ws, [&](auto& w) { return w.led ? -more * w.led->asked_W[axis] : 0; }), true});
+    column.parts.push_back(
+        {kVariances[a],
+         values(ws,
+                [&](auto& w) {
+                  return w.led ? std::log1p(std::pow(m * more, 2) * w.led->asked2[axis] / w.sigma[axis]) / m : 0;
+                }),
+         true});
   }
   return column;
 }

@@ -100,7 +100,7 @@ std::vector<NotMeasured> not_measured(const Observations& seen) {
 std::string to_text(const NotMeasured& gap, std::size_t flights) {
   std::vector<ActingFlight> without;
   for (const std::size_t f : gap.flights) without.push_back({f});
-  return gap.what + ": not measured " + when(When::any, without, flights) + ", asked in the others";
+  return gap.what + ", not measured in all flights; without: " + when(When::any, without, flights);
 }
 
 std::string where(const NamedCause& cause) {

@@ -24,7 +24,7 @@ struct NotMeasured {
   std::vector<std::size_t> flights;
 };
 std::vector<NotMeasured> not_measured(const Observations& seen);
-/// "rpm over command: not measured up to flight 6, asked in the others".
+/// "rpm over command, not measured in all flights; without: up to flight 6".
 std::string to_text(const NotMeasured& gap, std::size_t flights);
 
 /// "rotor 3, flights 5-8"; empty for a cause of all flights.

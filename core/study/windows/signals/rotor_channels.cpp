@@ -155,7 +155,8 @@ std::vector<ChannelValue> rotor_values(const log::FlightLog& log, const Series& 
     for (std::size_t rotor = 0; rotor < 4; ++rotor) values.push_back({channel + rotor, x[rotor] - mean, 1});
   };
   if (motors) put_contrast(kMotor1, share);
-  for (std::size_t rotor = 0; motors && rotor < 4; ++rotor) ratio[rotor] -= share[rotor];
+  if (motors)
+    for (std::size_t rotor = 0; rotor < 4; ++rotor) ratio[rotor] -= share[rotor];
   if (rpms) put_contrast(kRpm1, ratio);
   return values;
 }
