@@ -10,6 +10,8 @@
 #include <fstream>
 #include <random>
 
+#include "core/log/columns/log_columns.hpp"
+
 namespace backwash::log {
 namespace {
 
@@ -123,6 +125,21 @@ TEST_F(FlightLogFile, NothingIsOverwrittenWithoutBeingTold) {
   const auto nowhere = write_csv(path("no/such/folder.csv"), log, false);
   ASSERT_FALSE(nowhere);
   EXPECT_EQ(nowhere.error().kind, Kind::cannot_create);
+}
+
+/// A gap costs its row, many of them their column, and one in a column that no log holds nothing.
+TEST_F(FlightLogFile, GapsCostTheirRowsOrTheirColumn) {
+  auto log = read_csv(with("t_s,x_m,thrust,rpm1,mine\n0,1,,,1\n0.1,2,0.5,nan,\n0.2,NaN,0.5,3,1\n0.3,4,0.5,,1\n"), "t_s",
+                      {}, true);
+  ASSERT_TRUE(log) << log.error().message;
+  const auto told = leave_out_gaps(*log);
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(told[0], "half of the rows and more are gaps; left out: rpm1");
+  EXPECT_EQ(told[1], "2 of 4 rows left out: gaps in x_m, thrust");
+  EXPECT_EQ(log->t_s, (std::vector<double>{0.1, 0.3}));
+  EXPECT_EQ(log->column("x_m"), (std::vector<double>{2, 4}));
+  EXPECT_FALSE(log->has("rpm1"));
+  EXPECT_TRUE(leave_out_gaps(*log).empty());
 }
 
 }  // namespace

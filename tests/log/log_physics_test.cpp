@@ -162,6 +162,22 @@ TEST(Impossible, NorAreColumnsThatNothingHasMeasured) {
             std::string::npos);
 }
 
+TEST(Impossible, NorAreCommandsOfRotorsThatAreNoShares) {
+  auto log = flown();
+  for (const char* name : {"motor1", "motor2", "motor3", "motor4"}) log.columns[name].assign(log.t_s.size(), 0.4);
+  const auto sane = log;
+  for (const char* name : {"motor1", "motor2", "motor3", "motor4"}) log.columns[name].assign(log.t_s.size(), 1400);
+  const auto left = leave_out_doubted(log);
+  ASSERT_TRUE(left) << left.error();
+  ASSERT_EQ(left->size(), 1u);
+  EXPECT_EQ(left->front(),
+            "motor1 goes from 1400 to 1400: it is a share, 0 … 1; give its unit; left out: motor1, motor2, "
+            "motor3, motor4");
+  EXPECT_FALSE(log.has("motor4"));
+  auto again = sane;
+  EXPECT_TRUE(leave_out_doubted(again)->empty());
+}
+
 TEST(Impossible, AnAttitudeInAnotherOrderIsToldWithTheOrderThatFits) {
   const auto rotated = [](std::size_t by) {
     return [by](FlightLog& log) {

@@ -79,6 +79,20 @@ TEST(Divisions, FindTheFlightsWhetherTheyFollowEachOtherOrNot) {
   }
 }
 
+/// It has no scatter of its own, wherever it was flown.
+TEST(Divisions, OneFlightAloneIsNone) {
+  for (std::size_t odd = 0; odd < 12; ++odd) {
+    std::vector<double> values(12, 0.0);
+    for (std::size_t f = 0; f < values.size(); ++f) values[f] = f == odd ? 1 : 0.001 * static_cast<double>(f % 3);
+    for (const auto& d : divisions(values_of(values)))
+      for (const auto& row : d.profile.rowwise())
+        if (d.when != When::growing) {
+          EXPECT_GE(row.sum(), 2) << odd;
+          EXPECT_LE(row.sum(), 10) << odd;
+        }
+  }
+}
+
 TEST(Divisions, TwoStepsAreTwoOnlyIfEachIsClear) {
   std::mt19937 rng(4);
   std::normal_distribution<double> scatter(0, 0.01);
@@ -311,6 +325,26 @@ TEST(Changes, AMassByThirdsOfTheCampaignIsToldWithItsSteps) {
     if (!cause.when.empty()) when.push_back(cause.when);
   }
   EXPECT_EQ(when, (std::vector<std::string>{"from flight 5 on", "from flight 9 on"})) << study_worlds::told(result);
+}
+
+/// A share is missing of the thrust of the flights that carried it, and not of the mean over those without it as well.
+TEST(Changes, AMassInHalfOfTheFlightsHasItsOwnSize) {
+  const auto world = [](double size) { return study_worlds::draw_world({4720, {"payload"}, size, 12, ""}); };
+  const auto heavy = world(1);
+  auto flights = study_worlds::fly_all(world(0.3 / std::abs(heavy.effects.of("payload"))));
+  const auto none = study_worlds::fly_all(world(1e-9));
+  for (std::size_t f = 0; f < 6; ++f) flights[f] = none[f];
+  auto options = study_worlds::with_reference(heavy, folder());
+  options.minimum_detectable = options.dependence = false;
+  const auto result = study(study_worlds::observe(heavy, flights, folder()), options);
+  ASSERT_FALSE(result.causes.empty());
+  ASSERT_EQ(result.causes[0].found.form->cause(), "payload") << study_worlds::told(result);
+  EXPECT_EQ(result.causes[0].when, "from flight 7 on");
+  const auto& m = result.causes[0].found.parameters[0];
+  const double carried = std::copysign(0.3, heavy.effects.of("payload"));
+  EXPECT_NEAR(m.value, carried, 0.02);
+  EXPECT_LE(m.low, carried);
+  EXPECT_GE(m.high, carried);
 }
 
 /// Every flight discharges alike: a mass and one more since a moment of each flight imitate the voltage.

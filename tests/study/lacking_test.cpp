@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/study/effects/table.hpp"
+#include "core/study/findings/when_it_acts.hpp"
 #include "tests/study_worlds/observe.hpp"
 
 namespace lacking {
@@ -84,6 +85,21 @@ TEST(Lacking, WithoutThrustALateLoopIsNoDrag) {
   EXPECT_EQ(told(seen), "nothing");
   for (const char* cause : {"rotor_drag", "inflow"}) EXPECT_EQ(why_not(cause, seen), "no thrust column");
   EXPECT_EQ(why_not("payload", seen), "tested");
+}
+
+/// Without commands a rotor's rpm² is over nothing, and no value of the channel that holds it over the command.
+TEST(Lacking, MotorCommandsInSomeFlightsAreAGapInTheOthers) {
+  std::size_t flight = 0;
+  const auto seen = changed([&](Table& table) {
+    if (flight++ >= 6) return;
+    for (const char* name : {"motor1", "motor2", "motor3", "motor4"}) drop(table, name);
+  });
+  EXPECT_EQ(told(seen), "nothing");
+  EXPECT_EQ(why_not("rotor_sensor_fault", seen), "tested");
+  const auto gaps = not_measured(seen);
+  ASSERT_EQ(gaps.size(), 2u);
+  EXPECT_EQ(gaps[1].flights, (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
+  EXPECT_EQ(to_text(gaps[1], seen.flights), "rpm over command, not measured in all flights; without: up to flight 6");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <random>
 
@@ -103,6 +104,60 @@ TEST(RotorsAgainstReference, NameTheSmallestDamageThatTheyPromiseAboutFourTimesI
     EXPECT_LT(named, 0.95 * kTrials) << promised;
     EXPECT_LT(third_named, 0.5 * kTrials) << promised;
   }
+}
+
+/// Windows of flights with these shares.
+Observations seen_with(const Shares& shares) {
+  constexpr std::size_t kWindows = 20;
+  Observations seen;
+  seen.flights = shares.size();
+  seen.windows.resize(kWindows * shares.size());
+  seen.first = {0};
+  for (std::size_t f = 0; f < shares.size(); ++f) seen.first.push_back(kWindows * (f + 1));
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    seen.y[c].assign(seen.windows.size(), 0);
+    seen.weight[c].assign(seen.windows.size(), c >= kMotor1 && c <= kMotor4 ? 1 : 0);
+  }
+  for (std::size_t i = 0; i < seen.windows.size(); ++i)
+    for (std::size_t r = 0; r < 4; ++r) seen.y[kMotor1 + r][i] = shares[i / kWindows][static_cast<Eigen::Index>(r)];
+  seen.units.first = seen.first;
+  return seen;
+}
+
+/// Of 12 flights: what those of which `acts` shows.
+RotorsTold told_where(Shares shares, const std::function<bool(std::size_t)>& acts, double need) {
+  std::vector<double> amount;
+  for (std::size_t f = 0; f < shares.size(); ++f) {
+    if (acts(f)) shares[f] += damaged(need, 1) - damaged(need, 1).mean();
+    amount.insert(amount.end(), 20, acts(f) ? 1.0 : 0.0);
+  }
+  return *rotors_of(seen_with(shares), amount);
+}
+
+/// Where flights scatter little about their level, a propeller that needs 15 % more in some of them is no sound one.
+TEST(RotorsOfSomeFlights, AreHeldAgainstWhatTheFlightsThemselvesScatterBy) {
+  std::mt19937 rng(17);
+  const auto steady = [&] { return flights({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1}, kNone, rng, 0.002); };
+  for (const double need : {0.15, 0.3, 0.6}) {
+    for (const auto& acts : {std::function([](std::size_t f) { return f >= 6; }),
+                             std::function([](std::size_t f) { return f >= 3 && f < 7; }),
+                             std::function([](std::size_t f) { return f % 2 == 1; })}) {
+      const auto v = told_where(steady(), acts, need);
+      EXPECT_FALSE(v.holds(RotorState::sound)) << need;
+      EXPECT_TRUE(v.holds(RotorState::propeller_damage)) << need;
+      EXPECT_EQ(v.rotor, 1u) << need;
+    }
+  }
+  int damaged_alone = 0, sound = 0;
+  constexpr int kTrials = 200;
+  for (int k = 0; k < kTrials; ++k) {  // sessions of two flights
+    const auto v = told_where(
+        flights({2, 2, 2, 2, 2, 2}, kNone, rng), [](std::size_t f) { return f >= 6; }, 0);
+    damaged_alone += alone(v, RotorState::propeller_damage);
+    sound += v.holds(RotorState::sound);
+  }
+  EXPECT_LE(damaged_alone, kRules.rotor_level * kTrials);
+  EXPECT_GE(sound, (1 - 3 * kRules.rotor_level) * kTrials);
 }
 
 /// However heavy, wherever it hangs, however well the craft is known.

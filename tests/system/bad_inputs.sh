@@ -204,6 +204,13 @@ tells "short.csv:1: no column 'y_m'" study --log sound.csv short.csv --vehicle $
 "$backwash" study --log gravity.csv short.csv --vehicle $quad >stdout 2>stderr
 [[ $? == 65 && $(wc -l <stderr) == 3 ]] || { echo "none of two logs is left: $(cat stderr)"; failed=1; }
 refused 66 "absent.csv" study --log sound.csv absent.csv --vehicle $quad
+refused 64 "--map builtin:apartment is followed by no --log" \
+  study --map builtin:apartment --map builtin:narrow-gap --log sound.csv --vehicle $quad
+head -1 sound.csv >header_only.csv
+tells "header_only.csv:1: 0 rows are no flight" study --log sound.csv header_only.csv --vehicle $quad
+sed '5s/,[^,]*$/,nan/' sound.csv >gap.csv
+tells "1 of 300 rows left out: gaps in $(head -1 sound.csv | sed 's/.*,//')" study --log gap.csv --vehicle $quad
+refused 65 "needs 4 flights or more that are not judged" study --log sound.csv --reference sound.csv --vehicle $quad
 refused 65 "gravity.csv:1: az_mps2" study --log sound.csv --reference gravity.csv --vehicle $quad
 refused 66 "quad-5in: no built-in vehicle; give builtin:quad-5in or" vehicle print quad-5in
 refused 66 "builtin:quad-5in: no built-in daemon" vehicle print builtin:quad-5in --kind daemon

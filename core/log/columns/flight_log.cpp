@@ -14,6 +14,8 @@
 #include <string_view>
 #include <utility>
 
+#include "core/log/columns/import_columns.hpp"
+#include "core/log/columns/log_columns.hpp"
 #include "core/log/raw/log_file.hpp"
 
 namespace backwash::log {
@@ -105,7 +107,44 @@ void append(std::string& text, double value) {
   text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
 }
 
+std::size_t gaps_in(const std::vector<double>& column) {
+  return static_cast<std::size_t>(std::ranges::count_if(column, [](double x) { return std::isnan(x); }));
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
 }  // namespace
+
+std::vector<std::string> leave_out_gaps(FlightLog& log) {
+  const std::size_t rows = log.t_s.size();
+  std::vector<std::string> told, gone, gappy;
+  for (const auto& [name, column] : log.columns)
+    if (2 * gaps_in(column) >= std::max<std::size_t>(rows, 1)) gone.push_back(name);
+  for (const auto& name : gone) log.columns.erase(name);
+  if (!gone.empty()) told.push_back("half of the rows and more are gaps; left out: " + listed(gone));
+  std::vector<bool> good(rows);
+  for (std::size_t i = 0; i < rows; ++i) good[i] = !std::isnan(log.t_s[i]);
+  if (gaps_in(log.t_s) > 0) gappy.emplace_back("t_s");
+  for (const auto& name : mappable_columns()) {
+    if (!log.has(name) || gaps_in(log.column(name)) == 0) continue;
+    gappy.push_back(name);
+    for (std::size_t i = 0; i < rows; ++i) good[i] = good[i] && !std::isnan(log.column(name)[i]);
+  }
+  if (gappy.empty()) return told;
+  const auto keep = [&](std::vector<double>& column) {
+    std::size_t i = 0;
+    std::erase_if(column, [&](double) { return !good[i++]; });
+  };
+  keep(log.t_s);
+  for (auto& [name, column] : log.columns) keep(column);
+  told.push_back(std::to_string(rows - log.t_s.size()) + " of " + std::to_string(rows) + " rows left out: gaps in " +
+                 listed(gappy));
+  return told;
+}
 
 tl::expected<std::string, LogError> read_log_file(const std::string& path, std::size_t most_bytes,
                                                   const std::string& wanted) {

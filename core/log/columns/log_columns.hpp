@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/log/columns/flight_log.hpp"
 #include "core/types/geometry.hpp"
@@ -24,5 +25,9 @@ inline Vec3 xyz(const FlightLog& log, const std::string& prefix, const std::stri
   return {log.column(prefix + "x" + unit)[row], log.column(prefix + "y" + unit)[row],
           log.column(prefix + "z" + unit)[row]};
 }
+
+/// Takes the gaps (NaN) out of a log: a column of which half the rows and more are gaps is left out, and then each row
+/// with a gap in a column that a log may hold (mappable_columns()) or in t_s. What was left out, a sentence each.
+std::vector<std::string> leave_out_gaps(FlightLog& log);
 
 }  // namespace backwash::log

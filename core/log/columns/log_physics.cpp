@@ -133,13 +133,20 @@ Doubts of_tilt(const FlightLog& log) {
                    averaged(log.t_s, tilts(log)), averaged(log.t_s, rows_of(log, kA)));
 }
 
-Doubts of_thrust(const FlightLog& log) {
-  const auto [least, most] = std::ranges::minmax(log.column("thrust"));
-  if (least >= kLeastThrust && most <= kMostThrust) return {};
-  return {{{"thrust"},
-           "thrust goes from " + formatted("%.3g", least) + " to " + formatted("%.3g", most) +
-               ": it is a share, 0 … 1; give its unit",
-           true}};
+/// Commands that are no shares. Without the rotors' a flight is still one, without the thrust's it is not as logged.
+Doubts of_commands(const FlightLog& log) {
+  constexpr std::array kCommands{"thrust", "motor1", "motor2", "motor3", "motor4"};
+  for (const std::string name : kCommands) {
+    if (!log.has(name) || log.column(name).empty()) continue;
+    const auto [least, most] = std::ranges::minmax(log.column(name));
+    if (least >= kLeastThrust && most <= kMostThrust) continue;
+    const bool whole = name == kCommands[0];
+    return {{whole ? std::vector{name} : std::vector<std::string>(kCommands.begin() + 1, kCommands.end()),
+             name + " goes from " + formatted("%.4g", least) + " to " + formatted("%.4g", most) +
+                 ": it is a share, 0 … 1; give its unit",
+             whole}};
+  }
+  return {};
 }
 
 /// Stamps that are none of a flight.
@@ -230,7 +237,7 @@ Doubts contradictions(const FlightLog& log) {
   }
   if (has_all(log, kA)) add(doubts, of_gravity(log));
   if (has_all(log, kQ)) add(doubts, of_attitude(log));
-  if (log.has("thrust")) add(doubts, of_thrust(log));
+  add(doubts, of_commands(log));
   return doubts;
 }
 

@@ -226,6 +226,7 @@ std::string limits_sections(const StudyResult& result, const Observations& seen)
   std::string untested, smallest, left_out;
   for (const auto& [name, why] : result.not_tested) untested += row(spoken(name), why);
   for (const auto& r : result.refused) untested += row("Refused: " + spoken(r.name), refusal(r));
+  for (const auto& gap : not_measured(seen)) untested += row(gap.what, to_text(gap, seen.flights));
   if (result.not_tested.empty()) untested += row("Everything in the catalogue was tested", "");
   if (!result.smallest_looked_for)
     smallest += row("Not looked for", "the study was asked without them (--quick), or has too few flights");

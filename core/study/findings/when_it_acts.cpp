@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/findings/when_it_acts.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <tuple>
+#include <utility>
 
 #include "core/study/inference/estimate.hpp"
 
@@ -78,6 +80,27 @@ std::string when(When when, const std::vector<ActingFlight>& acting, std::size_t
     if (acting[k].until_s) text += ", until " + seconds(*acting[k].until_s) + " in flight " + number(k);
   }
   return text;
+}
+
+std::vector<NotMeasured> not_measured(const Observations& seen) {
+  std::vector<NotMeasured> gaps;
+  for (const auto& [channel, what] : {std::pair(kMotor1, "the rotors' commands"), {kRpm1, "rpm over command"}}) {
+    NotMeasured gap{what, {}};
+    for (std::size_t f = 0; f < seen.flights && seen.measured(channel); ++f) {
+      const auto& weight = seen.weight[channel];
+      const auto begin = weight.begin() + static_cast<std::ptrdiff_t>(seen.first[f]),
+                 end = weight.begin() + static_cast<std::ptrdiff_t>(seen.first[f + 1]);
+      if (begin != end && std::all_of(begin, end, [](double w) { return !(w > 0); })) gap.flights.push_back(f);
+    }
+    if (!gap.flights.empty()) gaps.push_back(std::move(gap));
+  }
+  return gaps;
+}
+
+std::string to_text(const NotMeasured& gap, std::size_t flights) {
+  std::vector<ActingFlight> without;
+  for (const std::size_t f : gap.flights) without.push_back({f});
+  return gap.what + ", not measured in all flights; without: " + when(When::any, without, flights);
 }
 
 std::string where(const NamedCause& cause) {

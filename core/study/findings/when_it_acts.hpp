@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/study/findings/study.hpp"
 
@@ -16,6 +17,15 @@ NamedCause named(const Change& change, const Evidence& rest);
 /// "from flight 7 on", "flights 1, 3-5", "from flight 5 on, since 34 s in flight 5", "since 60 s of each flight",
 /// "growing from flight to flight"; flights count from 1. `flights`: how many there are.
 std::string when(When when, const std::vector<ActingFlight>& acting, std::size_t flights);
+
+/// What of the rotors is measured in some flights, and in which others (from 0) it is not, as their logs lack a column.
+struct NotMeasured {
+  std::string what;
+  std::vector<std::size_t> flights;
+};
+std::vector<NotMeasured> not_measured(const Observations& seen);
+/// "rpm over command, not measured in all flights; without: up to flight 6".
+std::string to_text(const NotMeasured& gap, std::size_t flights);
 
 /// "rotor 3, flights 5-8"; empty for a cause of all flights.
 std::string where(const NamedCause& cause);

@@ -38,7 +38,7 @@ enum Channel : std::size_t {
   kMotor2,
   kMotor3,
   kMotor4,
-  kRpm1,  ///< ln rpm² over commanded thrust of a rotor, less the mean of the four
+  kRpm1,  ///< ln rpm² over commanded thrust of a rotor, less the mean of the four; of rpm² where no flight has commands
   kRpm2,
   kRpm3,
   kRpm4,

@@ -34,6 +34,18 @@ std::vector<double> shares_of_samples(const WindowRow& row, SampleRange w) {
   return all;
 }
 
+/// Without commands the rpm channels hold rpm² alone. That is no value beside windows in which it is over the command:
+/// there the others have a gap.
+void leave_one_meaning(Observations& seen) {
+  const auto measured = [&](Channel c, std::size_t i) { return seen.weight[c][i] > 0; };
+  bool over_command = false;
+  for (std::size_t i = 0; i < seen.windows.size(); ++i)
+    over_command = over_command || (measured(kMotor1, i) && measured(kRpm1, i));
+  for (std::size_t i = 0; i < seen.windows.size() && over_command; ++i)
+    for (std::size_t r = 0; r < 4; ++r)
+      if (!measured(kMotor1, i)) seen.y[kRpm1 + r][i] = seen.weight[kRpm1 + r][i] = 0;
+}
+
 }  // namespace
 
 Observer::Observer(const Vehicle& vehicle, const Model& model, const map::OccupancyGrid* grid)
@@ -177,6 +189,7 @@ Observations Observer::finish() {
   all_.seen.units.first = all_.seen.first;
   all_.delays.settle(all_.seen.windows);
   put_tails();
+  leave_one_meaning(all_.seen);
   const auto need = [&](Source source, std::initializer_list<const char*> columns) {
     for (const char* column : columns)
       if (!all_.ever.contains(column)) all_.seen.missing.emplace(source, std::string("no ") + column + " column");

@@ -63,7 +63,15 @@ void add_campaign_options(Command& command, CampaignFiles& files) {
 void each_readable(const CampaignFiles& files, LogNotes& notes,
                    const std::function<void(const std::string& log, std::size_t place)>& read) {
   std::vector<std::string> paths;
-  for (const auto& file : files.logs) paths.push_back(file.path);
+  std::vector<bool> followed(files.maps.size());
+  for (const auto& file : files.logs) {
+    paths.push_back(file.path);
+    if (file.map) followed[*file.map] = true;
+  }
+  if (const auto idle = std::find(followed.begin(), followed.end(), false);
+      followed.size() > 1 && idle != followed.end())
+    throw Failure(kUsage, "--map " + files.maps[static_cast<std::size_t>(idle - followed.begin())] +
+                              " is followed by no --log; give it before those flown in it");
   std::size_t next = 0;
   each_readable(paths, notes, [&](const std::string& path) { read(path, place_of(files, files.logs[next++])); });
 }

@@ -26,7 +26,7 @@ struct CampaignFiles {
 /// --map and --log, both as often as wanted.
 void add_campaign_options(Command& command, CampaignFiles& files);
 /// each_readable() of the logs, with the place of each among the maps, 0 without one. Throws Failure 64 for a log
-/// that follows no map where there are several, or where another log follows the only one.
+/// that follows no map where there are several, or where another log follows the only one; and for a map without logs.
 void each_readable(const CampaignFiles& files, LogNotes& notes,
                    const std::function<void(const std::string& log, std::size_t place)>& read);
 

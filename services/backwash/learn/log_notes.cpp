@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <optional>
 
 #include "core/report/page/page.hpp"
 #include "services/backwash/verb.hpp"
@@ -50,7 +49,6 @@ void LogNotes::place(const Place& place) {
 
 void each_readable(const std::vector<std::string>& logs, LogNotes& notes,
                    const std::function<void(const std::string& log)>& read) {
-  std::optional<Failure> first;
   std::size_t good = 0;
   for (const auto& log : logs) {
     try {
@@ -58,11 +56,11 @@ void each_readable(const std::vector<std::string>& logs, LogNotes& notes,
       ++good;
     } catch (const Failure& failure) {
       if (failure.exit_code != kBadData || logs.size() == 1) throw;
-      if (!first) first = failure;
       notes.left_out(log, failure.what());
     }
   }
-  if (good == 0 && first) throw Failure(*first);
+  if (good == 0 && !logs.empty())
+    throw Failure(kBadData, logs.front() + ":1: this log and all others are left out: none is left");
 }
 
 Json told_first(const LogNotes& notes, const Json& json) {

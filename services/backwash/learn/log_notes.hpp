@@ -30,8 +30,8 @@ struct LogNotes {
   void place(const Place& place);
 };
 
-/// Calls `read` for each log. One that throws bad data is left out, told on stderr at once. Throws Failure: the first
-/// one if none is left; any that is not bad data, such as a file that is not there.
+/// Calls `read` for each log. One that throws bad data is left out, told on stderr at once. Throws Failure 65
+/// if none is left, and any that is not bad data, such as a file that is not there.
 void each_readable(const std::vector<std::string>& logs, LogNotes& notes,
                    const std::function<void(const std::string& log)>& read);
 

@@ -7,7 +7,6 @@
 #include "core/study/findings/study_page.hpp"
 #include "core/study/inference/rotors/rotor_reference.hpp"
 #include "core/study/inference/rotors/sound_rotors.hpp"
-#include "core/study/windows/observer.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/learn/calibrate_input.hpp"
 #include "services/backwash/learn/study_design.hpp"
@@ -56,15 +55,6 @@ void refuse_other_numbers(const std::vector<std::string>& logs) {
                               "import it and swap motor2 and motor3");
 }
 
-/// Flights known to be sound; nothing without such.
-std::optional<study::Observations> sound_flights(const StudyOptions& options, const Vehicle& vehicle,
-                                                 const Model& model, LogNotes& notes) {
-  if (options.reference.empty()) return std::nullopt;
-  study::Observer observer(vehicle, model, nullptr);
-  each_readable(options.reference, notes, [&](const auto& path) { observer.add(read_studied(path, notes)); });
-  return observer.finish();
-}
-
 /// Motor shares of the flights against those of the reference flights; nothing without such.
 std::optional<study::RotorVerdict> against_reference(const StudyOptions& options,
                                                      const std::optional<study::Observations>& sound,
@@ -72,9 +62,11 @@ std::optional<study::RotorVerdict> against_reference(const StudyOptions& options
   if (!sound) return std::nullopt;
   auto verdict = study::judge_rotors(study::rotor_shares(*sound), study::rotor_shares(seen));
   if (!verdict)
-    throw Failure(kBadData,
-                  options.reference.front() +
-                      ":1: --reference needs 4 flights or more with motor1 … motor4, and the logs need these too");
+    throw Failure(
+        kBadData,
+        options.reference.front() +
+            ":1: --reference needs 4 flights or more that are not judged as well, with motor1 … motor4, and the "
+            "logs need these too");
   return verdict;
 }
 
@@ -208,7 +200,7 @@ int run(const StudyOptions& options) {
   const LookedWith with{vehicle, rooms, notes};
   if (options.rows) return print_rows(options, with);
   Flights flights = read_flights(options, with);
-  const auto sound = sound_flights(options, vehicle, model, notes);
+  const auto sound = sound_flights(options.reference, with, model, flights);
   auto chosen = study_options(options, sound);
   auto seen = observations(flights, with);
   const auto measured = options.residuals ? seen : study::Observations{};  // nothing that the model holds taken out

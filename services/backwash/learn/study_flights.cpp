@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/log/columns/import_columns.hpp"
+#include "core/log/columns/log_columns.hpp"
 #include "core/log/kinds/recording.hpp"
 #include "core/log/raw/raw_flight.hpp"
 #include "core/study/windows/observer.hpp"
@@ -35,6 +36,7 @@ void leave_out(Flights& flights, const std::vector<std::pair<std::size_t, std::s
   keep(flights.rooms);
   keep(flights.group);
   keep(flights.logs);
+  keep(flights.marks);
 }
 
 }  // namespace
@@ -57,7 +59,9 @@ log::FlightLog read_told(const std::string& path, LogNotes& notes) {
 }
 
 log::FlightLog read_studied(const std::string& path, LogNotes& notes) {
-  auto log = read_told(path, notes);
+  const bool table = read_or_fail(log::recording_of(path))->form == log::RecordingKind::Form::table;
+  auto log = table ? read_or_fail(log::read_csv(path, "t_s", {}, true)) : read_told(path, notes);
+  for (const auto& what : log::leave_out_gaps(log)) notes.column(path, what);
   for (const char* name : {"x_m", "y_m", "z_m"})
     if (!log.has(name))
       throw Failure(kBadData, path + ":1: no column '" + name + "'; a study needs positions x_m, y_m, z_m");
@@ -67,6 +71,17 @@ log::FlightLog read_studied(const std::string& path, LogNotes& notes) {
   if (!left_out) throw Failure(kBadData, path + ":1: " + left_out.error());
   for (const auto& what : *left_out) notes.column(path, what);
   return log;
+}
+
+study::Observed observed(const std::string& path, const log::FlightLog& log, const Vehicle& vehicle,
+                         study::MapView& surroundings) {
+  study::Observer observer(vehicle, surroundings);
+  observer.add(log);
+  auto all = observer.take();
+  if (all.seen.windows.empty() && all.seen.gated_out.empty())
+    throw Failure(kBadData, path + ":1: " + std::to_string(log.t_s.size()) +
+                                " rows are no flight: there is no window of 2 s in them");
+  return all;
 }
 
 Room::Room(std::string map, const Model& model)
@@ -81,14 +96,13 @@ StudiedFlight look_at(const std::string& path, std::size_t room, const std::stri
   if (!group.empty() && (!log.has(group) || log.column(group).empty()))
     throw Failure(kBadData, path + ":1: no column '" + group + "' to group flights by; name one that it has");
   Room& in = with.rooms[room];
+  auto all = observed(path, log, with.vehicle, in.surroundings);
   std::optional<study::MapShare> place;
   if (in.grid) {
     place = study::map_share(log, *in.grid, with.vehicle);
     with.notes.place({path, in.name, *place});
   }
-  study::Observer observer(with.vehicle, in.surroundings);
-  observer.add(log);
-  StudiedFlight flight{path, group.empty() ? 0 : log.column(group).front(), log::FlightMark(log), observer.take(), room,
+  StudiedFlight flight{path, group.empty() ? 0 : log.column(group).front(), log::FlightMark(log), std::move(all), room,
                        place};
   if (keep) keep->push_back(std::move(log));
   return flight;
@@ -96,13 +110,12 @@ StudiedFlight look_at(const std::string& path, std::size_t room, const std::stri
 
 Flights each_once(std::vector<StudiedFlight> studied, bool grouped, std::vector<log::FlightLog> logs) {
   Flights flights;
-  std::vector<log::FlightMark> marks;
   for (auto& flight : studied) {
     flights.paths.push_back(std::move(flight.path));
     flights.observed.push_back(std::move(flight.observed));
     flights.rooms.push_back(flight.room);
     if (grouped) flights.group.push_back(flight.group);
-    marks.push_back(std::move(flight.mark));
+    flights.marks.push_back(std::move(flight.mark));
   }
   flights.logs = std::move(logs);
   const auto twins_of = [](const std::vector<std::size_t>& same, const std::vector<std::size_t>& order) {
@@ -111,14 +124,36 @@ Flights each_once(std::vector<StudiedFlight> studied, bool grouped, std::vector<
       if (same[f] != f) twins.emplace_back(order[f], order[same[f]]);
     return twins;
   };
-  std::vector<std::size_t> as_given(marks.size());
+  std::vector<std::size_t> as_given(flights.marks.size());
   std::iota(as_given.begin(), as_given.end(), std::size_t{0});
-  leave_out(flights, twins_of(log::same_flights(marks), as_given));
+  leave_out(flights, twins_of(log::same_flights(flights.marks), as_given));
   const auto order = flights.order();
   std::vector<study::Gusts> gusts;
   for (const std::size_t k : order) gusts.push_back(study::gusts_of(flights.observed[k].seen, 0));
   leave_out(flights, twins_of(study::same_gusts(std::move(gusts)), order));
   return flights;
+}
+
+std::optional<study::Observations> sound_flights(const std::vector<std::string>& paths, const LookedWith& with,
+                                                 const Model& model, Flights& flights) {
+  if (paths.empty()) return std::nullopt;
+  study::MapView nowhere(nullptr, model);
+  study::Observer observer(with.vehicle, nowhere);
+  auto marks = flights.marks;
+  auto names = flights.paths;
+  each_readable(paths, with.notes, [&](const auto& path) {
+    const auto log = read_studied(path, with.notes);
+    const log::FlightMark mark(log);
+    const auto same = std::ranges::find_if(marks, [&](auto& m) { return m.shared(mark) >= log::kSameFlight; });
+    if (same != marks.end()) {
+      flights.twice.emplace_back(path, names[static_cast<std::size_t>(same - marks.begin())]);
+      return;
+    }
+    observer.add(observed(path, log, with.vehicle, nowhere));
+    marks.push_back(mark);
+    names.push_back(path);
+  });
+  return observer.finish();
 }
 
 std::vector<std::size_t> Flights::order() const {

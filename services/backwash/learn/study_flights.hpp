@@ -25,9 +25,14 @@ log::FlightLog read_flight(const std::string& path);
 /// The same; `notes` tell what its reader could not read or left out.
 log::FlightLog read_told(const std::string& path, LogNotes& notes);
 
-/// The same for a study, which needs positions: without the columns of sensors that never spoke, and without those of a
-/// table that the others contradict (core/log, leave_out_doubted()), which `notes` then tell. Throws Failure.
+/// The same for a study, which needs positions: without the columns of sensors that never spoke, and without the
+/// gaps of a table (core/log, leave_out_gaps()) and what in it the rest contradicts (leave_out_doubted()), which
+/// `notes` then tell. Throws Failure.
 log::FlightLog read_studied(const std::string& path, LogNotes& notes);
+
+/// What is seen of one log. Throws Failure where it is too short for one window.
+study::Observed observed(const std::string& path, const log::FlightLog& log, const Vehicle& vehicle,
+                         study::MapView& surroundings);
 
 /// A place that flights were flown in, and what was seen of it. Without a map nothing but the floor.
 struct Room {
@@ -64,7 +69,8 @@ struct Flights {
   std::vector<std::string> paths;
   std::vector<study::Observed> observed;
   std::vector<std::size_t> rooms;
-  std::vector<double> group;                               ///< empty: none
+  std::vector<double> group;  ///< empty: none
+  std::vector<log::FlightMark> marks;
   std::vector<log::FlightLog> logs;                        ///< where they are kept
   std::vector<std::pair<std::string, std::string>> twice;  ///< left out, and which flight it is again
   /// Numbers of the flights, those of one group behind each other.
@@ -80,6 +86,10 @@ void keep_pages();
 /// Leaves out flights that hold another one's positions, then those with another one's gusts. `logs`: of each, or
 /// empty.
 Flights each_once(std::vector<StudiedFlight> studied, bool grouped, std::vector<log::FlightLog> logs);
+/// Flights known to be sound, each once and none that is judged as well: those are told with `flights`. Nothing without
+/// such. Throws Failure.
+std::optional<study::Observations> sound_flights(const std::vector<std::string>& paths, const LookedWith& with,
+                                                 const Model& model, Flights& flights);
 /// All of them as one: takes what was observed out of `flights`.
 study::Observations observations(Flights& flights, const LookedWith& with);
 

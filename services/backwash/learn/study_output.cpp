@@ -126,6 +126,7 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
                {"causes", Json::array()},
                {"unknown", Json::array()},
                {"not_tested", Json::array()},
+               {"not_measured", Json::array()},
                {"remaining_dependence", Json::array()},
                {"minimum_detectable", Json::object()}};
   for (const auto& [gate, count] : seen.gated_out) json["gated_out"][study::to_string(gate)] = count;
@@ -147,6 +148,11 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
                                {"shape", u.shape},
                                {"hz", u.hz.value_or(0)}});
   for (const auto& [name, why] : result.not_tested) json["not_tested"].push_back({{"name", name}, {"why", why}});
+  for (const auto& [what, flights] : study::not_measured(seen)) {
+    Json in = Json::array();
+    for (const std::size_t f : flights) in.push_back(f + 1);
+    json["not_measured"].push_back({{"what", what}, {"flights", in}});
+  }
   for (const auto& d : result.remaining)
     if (d.found)
       json["remaining_dependence"].push_back(
@@ -253,6 +259,7 @@ void print_text(const study::StudyResult& result, const study::Observations& see
     if (d.found)
       std::printf("what remains in %s depends on %s, p %.4f (Holm)\n", d.group.c_str(), d.regressor.c_str(), d.p_holm);
   for (const auto& [name, why] : result.not_tested) std::printf("not tested: %s (%s)\n", name.c_str(), why.c_str());
+  for (const auto& gap : study::not_measured(seen)) std::printf("%s\n", study::to_text(gap, seen.flights).c_str());
   if (height) print_text("hovers and passes", height->all);
   if (height && height->hovers) print_text("hovers", *height->hovers);
   if (rotors) {

@@ -183,6 +183,32 @@ double sum(const std::vector<double>& all) {
   return s;
 }
 
+/// Gives a change the columns of the windows in which it acts: what a form takes the mean of, as the thrust of which a
+/// share is missing, was another without it. The factor of each parameter keeps what it moves first.
+void size_by_own(Change& change, const std::vector<double>& amount, const Observations& seen) {
+  Windows own;
+  for (std::size_t i = 0; i < amount.size(); ++i)
+    if (amount[i] > 0) own.push_back(seen.windows[i]);
+  Accepted& found = change.found;
+  const auto columns = found.form->columns(own, found.scale);
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    double product = 0, square = 0;
+    for (std::size_t part = 0; part < columns[k].parts.size(); ++part) {
+      auto& x = found.columns[k].parts[part].x;
+      for (std::size_t i = 0, j = 0; i < amount.size(); ++i) {
+        if (!(amount[i] > 0)) continue;
+        const double now = amount[i] * columns[k].parts[part].x[j++];
+        if (part == 0) {
+          product += now * x[i];
+          square += now * now;
+        }
+        x[i] = now;
+      }
+    }
+    if (square > 0) found.theta[static_cast<Eigen::Index>(k)] *= product / square;
+  }
+}
+
 bool of_rotors(const Accepted& cause) { return cause.columns.front().parts.front().channel >= kLine1; }
 
 /// Fits hypotheses beside what is accepted, in the scatter that each leaves.
@@ -231,11 +257,12 @@ class Fitting {
                   flights_of(one.amount, seen_),
                   masked(companions(a.form(), seen_), one.amount)};
     if (of_rotors(change.found)) change.open.insert(change.open.end(), a.columns().begin(), a.columns().end());
+    if (!a.form().anchor) size_by_own(change, one.amount, seen_);
     for (std::size_t k = 0; k < a.form().parameters.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
-      const double error = student_975(one.degrees) * one.error[i];
-      change.found.parameters.push_back(
-          {a.form().parameters[k], one.theta[i], one.theta[i] - error, one.theta[i] + error});
+      const double theta = change.found.theta[i], factor = one.theta[i] != 0 ? theta / one.theta[i] : 1;
+      const double error = student_975(one.degrees) * one.error[i] * std::abs(factor);
+      change.found.parameters.push_back({a.form().parameters[k], theta, theta - error, theta + error});
     }
     if (!a.form().scale_name.empty()) {
       const double number = a.scale().value + (a.form().integer_scale ? 1 : 0);

@@ -172,7 +172,7 @@ std::vector<Division> divisions(const FlightValues& values, const Expected& expe
   };
   Clearest from{regression}, run{regression}, any{regression};
   for (Eigen::Index a = kFewestASide; a + kFewestASide <= n; ++a) from.offer(between(n, a, n));
-  for (Eigen::Index a = 0; a < n; ++a)
+  for (Eigen::Index a = 1; a < n; ++a)  // from the first one on it is the rest of `from`
     for (Eigen::Index b = a + kFewestASide; b < n; ++b) run.offer(between(n, a, b));
   const auto order = ascending(values.of);
   Eigen::RowVectorXd high = Eigen::RowVectorXd::Zero(n);

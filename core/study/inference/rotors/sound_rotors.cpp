@@ -75,6 +75,18 @@ const Contrasts kOfOne(0.5, std::sqrt(0.5), std::sqrt(0.5));
 /// By what those of one sound craft scatter between sessions.
 const Contrasts kSession(kRotorRules.session_twist, kRotorRules.session_pairs, kRotorRules.session_pairs);
 
+/// What flights of one craft scatter by about the level of their group, and session_twist and session_pairs together.
+SoundScatter between_flights(const std::vector<std::vector<Eigen::Array4d>>& groups) {
+  double degrees = kRotorRules.session_degrees;
+  Contrasts square = degrees * kSession.square();
+  for (const auto& flights : groups) {
+    const Eigen::Array4d centre = mean_of(flights);
+    for (const auto& f : flights) square += contrasts_of(f - centre, kPairings[0]).square();
+    degrees += static_cast<double>(flights.size()) - 1;
+  }
+  return {(square / degrees).sqrt(), degrees};
+}
+
 void take_out(const Eigen::Array4d& own, std::size_t first, Observations& seen) {
   for (std::size_t r = 0; r < 4; ++r)
     for (double& y : seen.y[first + r]) y -= own[static_cast<Eigen::Index>(r)];
@@ -120,12 +132,9 @@ std::optional<SoundRotors> sound_rotors(const Observations& reference) {
 SoundScatter built_rotors() { return {kRotorRules.built_scatter * kOfOne, kRotorRules.session_degrees}; }
 
 SoundScatter scatter_of(const std::vector<Eigen::Array4d>& flights) {
-  const double n = static_cast<double>(flights.size()), prior = kRotorRules.session_degrees;
-  const Eigen::Array4d centre = mean_of(flights);
-  Contrasts square = prior * kSession.square();
-  for (const auto& f : flights) square += contrasts_of(f - centre, kPairings[0]).square();
-  const double degrees = n - 1 + prior;
-  return {(square / degrees * (1 + 1 / n)).sqrt(), degrees};
+  SoundScatter sound = between_flights({flights});
+  sound.scale *= std::sqrt(1 + 1 / static_cast<double>(flights.size()));
+  return sound;
 }
 
 std::optional<RotorsTold> rotors_of(const Observations& seen) {
@@ -134,26 +143,33 @@ std::optional<RotorsTold> rotors_of(const Observations& seen) {
 }
 
 std::optional<RotorsTold> rotors_of(const Observations& seen, const std::vector<double>& amount) {
-  std::array<Sums, 2> motors;  // without it, with it
-  std::array<double, 2> sessions{};
+  std::array<Sums, 2> motors;                        // without it, with it
+  std::vector<std::vector<Eigen::Array4d>> each(2);  // flight by itself
+  double sessions = 0;                               // with it
   std::array<std::array<double, 4>, 2> line{}, lines{};
-  for (std::size_t i = 0; i < amount.size(); ++i) {
-    const std::size_t k = amount[i] > 0 ? 1 : 0;
-    motors[k].add(seen, kMotor1, i);
-    if (i == 0 || (amount[i] > 0) != (amount[i - 1] > 0)) sessions[k] += 1;
-    for (std::size_t r = 0; r < 4; ++r) {
-      line[k][r] += seen.weight[kLine1 + r][i] * seen.y[kLine1 + r][i];
-      lines[k][r] += seen.weight[kLine1 + r][i];
+  for (std::size_t f = 0; f + 1 < seen.first.size(); ++f) {
+    std::array<Sums, 2> own;
+    for (std::size_t i = seen.first[f]; i < seen.first[f + 1]; ++i) {
+      const std::size_t k = amount[i] > 0 ? 1 : 0;
+      own[k].add(seen, kMotor1, i);
+      motors[k].add(seen, kMotor1, i);
+      if (k == 1 && (i == 0 || !(amount[i - 1] > 0))) sessions += 1;
+      for (std::size_t r = 0; r < 4; ++r) {
+        line[k][r] += seen.weight[kLine1 + r][i] * seen.y[kLine1 + r][i];
+        lines[k][r] += seen.weight[kLine1 + r][i];
+      }
     }
+    for (std::size_t k = 0; k < 2; ++k)
+      if (own[k].windows > 0) each[k].push_back(own[k].mean());
   }
-  if (!(motors[0].windows > 0 && motors[1].windows > 0)) return std::nullopt;
+  if (each[0].empty() || each[1].empty()) return std::nullopt;
   Eigen::Array4d shakes;
   for (std::size_t r = 0; r < 4; ++r)
     shakes[static_cast<Eigen::Index>(r)] = line[1][r] / lines[1][r] - line[0][r] / lines[0][r];
-  const double spread = std::sqrt(1 / sessions[0] + 1 / sessions[1]);
+  SoundScatter sound = between_flights(each);
+  sound.scale *= std::sqrt(1 / sessions + 1 / static_cast<double>(each[0].size()));
   const RotorLevel level =
-      level_of(motors[1].mean() - motors[0].mean(), shakes, {spread * kSession, kRotorRules.session_degrees},
-               motors[0].error2() + motors[1].error2(), seen);
+      level_of(motors[1].mean() - motors[0].mean(), shakes, sound, motors[0].error2() + motors[1].error2(), seen);
   return told_of(level.difference, level.sound);
 }
 

@@ -48,8 +48,8 @@ void name_rotors(Accepted& cause, const RotorsTold& told);
 
 /// What rotors show in all windows against the sound craft; nothing without motor commands.
 std::optional<RotorsTold> rotors_of(const Observations& seen);
-/// What they show where an amount is more than 0 (by window) against where it is not: neighbouring windows of one kind
-/// count as one session.
+/// What they show where an amount is more than 0 (by window) against where it is not. As with reference flights: the
+/// flights scatter about both levels, those without it count each, and of those with it neighbours count as one.
 std::optional<RotorsTold> rotors_of(const Observations& seen, const std::vector<double>& amount);
 /// Observations less the sound craft's own differences: as told by reference flights; and all that a sound craft may
 /// show (rotors_of), since the search must not explain it.

@@ -155,12 +155,9 @@ std::vector<ChannelValue> rotor_values(const log::FlightLog& log, const Series& 
     for (std::size_t rotor = 0; rotor < 4; ++rotor) values.push_back({channel + rotor, x[rotor] - mean, 1});
   };
   if (motors) put_contrast(kMotor1, share);
-  if (motors && rpms) {
+  if (motors)
     for (std::size_t rotor = 0; rotor < 4; ++rotor) ratio[rotor] -= share[rotor];
-    put_contrast(kRpm1, ratio);
-  } else if (rpms) {
-    put_contrast(kRpm1, ratio);
-  }
+  if (rpms) put_contrast(kRpm1, ratio);
   return values;
 }
 
