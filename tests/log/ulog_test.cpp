@@ -27,6 +27,9 @@ TEST(ULogReader, ReadsEveryShippedLogWithSubscriptionsAndAppendedData) {
     const auto log = decode_ulog(bytes_of(entry.path().filename().string()));
     ASSERT_TRUE(log) << entry.path() << ": " << log.error();
     EXPECT_FALSE(log->topics.empty()) << entry.path();
+    // One holds a mission of an earlier start: 1194 s in its first second, at 20 s.
+    const std::size_t strange = entry.path().filename() == "sample_log_small.ulg" ? 20 : 0;
+    EXPECT_EQ(log->loss.skipped(), strange) << entry.path() << ": " << log->loss.words().front();
   }
 }
 

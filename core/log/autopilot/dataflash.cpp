@@ -158,9 +158,14 @@ class DataflashDecoder {
   /// Whether the time of a message is one of its neighbours'.
   bool believed(std::size_t at) const {
     const double t = time_of(at);
-    if (newest_s_ && std::abs(t - *newest_s_) < kNeighbours_s) return true;
-    for (std::size_t next = at + size_at(at); next < bytes_.size() && stands(next); next += size_at(next))
-      if (formats_[bytes_[next + 2]].timed) return std::abs(t - time_of(next)) < kNeighbours_s;
+    if (newest_s_ && t - *newest_s_ < kNeighbours_s) return true;
+    int looked_at = 0;
+    for (std::size_t next = at + size_at(at); next < bytes_.size() && looked_at < kNeighbours && stands(next);
+         next += size_at(next))
+      if (formats_[bytes_[next + 2]].timed) {
+        if (std::abs(t - time_of(next)) < kNeighbours_s) return true;
+        ++looked_at;
+      }
     return !newest_s_;
   }
 
@@ -170,7 +175,7 @@ class DataflashDecoder {
     if (is_new) log_.topics.push_back({format.name, instance, {}, {}});
     auto& topic = log_.topics[found->second];
     const double t = time_of(static_cast<std::size_t>(p - bytes_.data()));
-    newest_s_ = t;
+    newest_s_ = std::max(newest_s_.value_or(0), t);
     log_.loss.read(format.size, t);
     topic.t_s.push_back(t);
     std::string name;

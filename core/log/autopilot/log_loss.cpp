@@ -13,13 +13,17 @@ void LogLoss::read(std::size_t bytes, std::optional<double> t_s) {
   if (!t_s) return;
   timed_bytes_ += bytes;
   timed_ += 1;
+  constexpr double kPause_s = 1;  // more between two messages says nothing of how much a log writes
+  const double step = newest_s_ ? *t_s - *newest_s_ : 0;
+  if (step < 0 && -step > kPause_s) return;  // what was said long before, written down now
   if (open_bytes_ > 0 && newest_s_) {
     bridged_ += 1;
     bridged_bytes_ += open_bytes_;
-    bridged_s_ += *t_s - *newest_s_;
+    bridged_s_ += step;
+  } else if (step > 0 && step < kPause_s) {
+    sound_s_ += step;
   }
   open_bytes_ = 0;
-  if (!first_s_) first_s_ = t_s;
   newest_s_ = std::max(newest_s_.value_or(*t_s), *t_s);
 }
 
@@ -48,13 +52,11 @@ void LogLoss::dropout(double duration_s) {
 }
 
 double LogLoss::missing() const {
-  if (bridged_ == 0 || !(*newest_s_ > *first_s_)) return 0;
+  if (bridged_ == 0 || !(sound_s_ > 0)) return 0;
   const auto bytes = static_cast<double>(timed_bytes_), mean = bytes / static_cast<double>(timed_);
-  const double between_s = *newest_s_ - *first_s_ - bridged_s_;  // while nothing was damaged
-  if (!(between_s > 0)) return 0;
   // From one message to the next passes what one of them takes, whole or not.
   return std::max(
-      0.0, bytes / between_s * bridged_s_ - static_cast<double>(bridged_bytes_) - mean * static_cast<double>(bridged_));
+      0.0, bytes / sound_s_ * bridged_s_ - static_cast<double>(bridged_bytes_) - mean * static_cast<double>(bridged_));
 }
 
 double LogLoss::share() const {

@@ -34,13 +34,14 @@ class LogLoss {
   double missing() const;
   std::size_t read_ = 0, skipped_ = 0, places_ = 0, timed_bytes_ = 0, timed_ = 0, dropouts_ = 0, misplaced_ = 0;
   std::size_t bridged_ = 0, bridged_bytes_ = 0, open_bytes_ = 0;  // places with a time on both sides; of the last one
-  double bridged_s_ = 0, dropout_s_ = 0;
-  std::optional<double> first_s_, newest_s_;
+  double bridged_s_ = 0, sound_s_ = 0, dropout_s_ = 0;            // sound: while nothing was damaged
+  std::optional<double> newest_s_;
   bool damaged_ = false, cut_ = false;
 };
 
-/// The time of a message that an autopilot's log may hold beside one of another time, s: what is farther from both of
-/// its neighbours in the file is damage.
+/// How much later than all before it a message may be, s, unless one of so many behind it is as late: else its time is
+/// damage. One may be earlier by any time: what was said before a log began is written into it.
 inline constexpr double kNeighbours_s = 10;
+inline constexpr int kNeighbours = 8;
 
 }  // namespace backwash::log

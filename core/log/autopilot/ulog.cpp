@@ -240,9 +240,14 @@ class UlogDecoder {
   /// Whether the time of data is one of its neighbours'.
   bool believed(std::size_t at) const {
     const double t = time_of(at);
-    if (newest_s_ && std::abs(t - *newest_s_) < kNeighbours_s) return true;
-    for (std::size_t next = end_of(at); next < bytes_.size() && stands(next); next = end_of(next))
-      if (type_of(next) == 'D' && fit(next) == Fit::content) return std::abs(t - time_of(next)) < kNeighbours_s;
+    if (newest_s_ && t - *newest_s_ < kNeighbours_s) return true;
+    int looked_at = 0;
+    for (std::size_t next = end_of(at); next < bytes_.size() && looked_at < kNeighbours && stands(next);
+         next = end_of(next))
+      if (type_of(next) == 'D' && fit(next) == Fit::content) {
+        if (std::abs(t - time_of(next)) < kNeighbours_s) return true;
+        ++looked_at;
+      }
     return !newest_s_;
   }
 
@@ -251,8 +256,8 @@ class UlogDecoder {
     if (found == subscriptions_.end() || !believed(at)) return log_.loss.skip(end_of(at) - at);
     const Subscription& s = found->second;
     TopicLog::Topic& topic = log_.topics[s.topic];
-    newest_s_ = time_of(at);
-    log_.loss.read(end_of(at) - at, newest_s_);
+    newest_s_ = std::max(newest_s_.value_or(0), time_of(at));
+    log_.loss.read(end_of(at) - at, time_of(at));
     const std::uint8_t* p = body.data() + 2;
     for (const auto& f : s.fields) {
       if (f.kind != '_') {

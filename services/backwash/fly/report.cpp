@@ -73,7 +73,7 @@ Verb report_verb(Command& app) {
   command
       .add_option("logs,--log", options->logs,
                   "raw log of backwashd, or parts of one in their order; of one file the later parts in its folder are "
-                  "read too. Or a log of PX4 or ArduPilot: what it says, and what can be asked of it")
+                  "read too; or an autopilot's own")
       .required();
   command.add_option("--truth", options->truth,
                      "log of the truth by backwash-bench, CSV; without it measured positions are judged");

@@ -253,10 +253,9 @@ int from_log(const VehicleFromOptions& options) {
 
 Verb vehicle_from_verb(Command& group) {
   const auto options = std::make_shared<VehicleFromOptions>();
-  auto& command =
-      group.add_subcommand("from", "A vehicle file from one log of PX4 or ArduPilot, each value with its source");
-  command.add_option("log", options->log, "the autopilot's own log, known by its content").required();
-  command.add_option("--out", options->out, "vehicle file to write; without it, it is printed");
+  auto& command = group.add_subcommand("from", "A vehicle file from one autopilot's log, each value with its source");
+  command.add_option("log", options->log, "the autopilot's own").required();
+  command.add_option("--out", options->out, "vehicle file to write, else printed");
   command.add_flag("--force", options->force, "overwrite --out");
   command.footer("Example:\n  backwash vehicle from flight.ulg --out own.vehicle.toml");
   return {&command, [options] { return from_log(*options); }};
