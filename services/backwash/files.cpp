@@ -90,8 +90,8 @@ std::pair<Vehicle, Model> read_both(const std::string& vehicle_path, const std::
   return both;
 }
 
-log::FlightLog read_table(const std::string& path, const std::string& time_column) {
-  auto table = log::read_csv(path, time_column);
+log::FlightLog read_table(const std::string& path, const std::string& time_column, bool gaps) {
+  auto table = log::read_csv(path, time_column, {}, gaps);
   if (table) return std::move(*table);
   if (table.error().kind == log::LogError::Kind::bad_data) {
     if (path.ends_with(".bwlog") || path.ends_with(".mcap"))

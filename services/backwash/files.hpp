@@ -33,7 +33,8 @@ std::pair<Vehicle, Model> read_both(const std::string& vehicle_path, const std::
 /// What a model or vehicle file held when it was read, the name of a built-in one; empty if it changed meanwhile, or
 /// was not read.
 std::string content_when_read(const std::string& path);
-log::FlightLog read_table(const std::string& path, const std::string& time_column);
+/// Reads a flight log; `gaps` as read_csv(). Failure: as read_csv(); of a recording, with the verb that makes a table.
+log::FlightLog read_table(const std::string& path, const std::string& time_column, bool gaps = false);
 /// What a reader of core/log gives; its error as Failure 66 or 65.
 template <typename T>
 T read_or_fail(tl::expected<T, log::LogError> read) {

@@ -255,7 +255,7 @@ refused 66 'absent.toml' import --map-columns absent.toml ms.csv -o logs
 refused 78 "unit.toml:2: key 'columns.t_s'" import --map-columns unit.toml ms.csv -o logs
 refused 78 "unknown_column.toml:5: key 'columns.height'" import --map-columns unknown_column.toml ms.csv -o logs
 refused 78 "key 'columns.z_m'" import --map-columns no_height.toml ms.csv -o logs
-refused 78 "is 'enu' or 'ned'" import --map-columns frame.toml ms.csv -o logs
+refused 78 "is 'enu', 'ned', or our x, y and z" import --map-columns frame.toml ms.csv -o logs
 refused 78 'give all of vx_mps, vy_mps, vz_mps or none' import --map-columns one_axis.toml ms.csv -o logs
 refused 78 'give this or qw' import --map-columns two_attitudes.toml ms.csv -o logs
 refused 65 'is the unit of the time right?' import --map-columns too_fast.toml ms.csv -o logs

@@ -60,7 +60,7 @@ log::FlightLog read_told(const std::string& path, LogNotes& notes) {
 
 log::FlightLog read_studied(const std::string& path, LogNotes& notes) {
   const bool table = read_or_fail(log::recording_of(path))->form == log::RecordingKind::Form::table;
-  auto log = table ? read_or_fail(log::read_csv(path, "t_s", {}, true)) : read_told(path, notes);
+  auto log = table ? read_table(path, "t_s", true) : read_told(path, notes);
   for (const auto& what : log::leave_out_gaps(log)) notes.column(path, what);
   for (const char* name : {"x_m", "y_m", "z_m"})
     if (!log.has(name))
