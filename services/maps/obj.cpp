@@ -2,6 +2,7 @@
 // assimp 5.2.5 lets faces with texture coordinates vanish where the file has none before them; places alone are read
 // here.
 #include <algorithm>
+#include <array>
 #include <span>
 
 #include "services/maps/geometry.hpp"
@@ -69,6 +70,12 @@ std::string take_element(char kind, std::string_view words, std::size_t before, 
   return "";
 }
 
+/// Statements that are read, or hold no shape by themselves.
+constexpr std::array<std::string_view, 31> kStatements{
+    "v",      "vt",     "vn",     "vp",     "f",     "l",   "p",      "g",     "s",         "o",    "mg",
+    "usemtl", "mtllib", "usemap", "maplib", "bevel", "lod", "cstype", "deg",   "bmat",      "step", "parm",
+    "trim",   "hole",   "scrv",   "sp",     "end",   "con", "ctech",  "stech", "shadow_obj"};
+
 /// Faces that the text says, by the first words of its lines alone.
 std::size_t faces_in(std::string_view text) {
   std::size_t count = 0;
@@ -97,6 +104,8 @@ Read read_obj(const std::string& path, std::string_view text) {
         why = take_element(what[0], words, before, statements.line(), geometry);
       if (what == "curv" || what == "surf" || what == "curv2" || what == "call")
         why = shown(what) + " is not read; export it as faces in one file";
+      else if (!what.empty() && std::ranges::find(kStatements, what) == kStatements.end())
+        why = shown(what) + " is no statement of an OBJ file that is known, and may hold faces; export faces as f";
       if (!why.empty()) return corrupt(path, ":" + std::to_string(statements.line()) + ": " + why);
       if (before > kMostPoints) return too_large(path, before);
     }

@@ -99,6 +99,9 @@ TEST(Axes, AHeightThatStaysAtTheFloorIsAsked) {
   EXPECT_EQ(flat->second, Vec3::UnitY());
   EXPECT_EQ(text_of(upright_world(flat->second)), "x, -z, y");
   EXPECT_FALSE(flat_height(flight(Turn::Identity(), Turn::Identity(), 0, 0)));
+  const auto below = flat_height(flight(*turn_of("y, x, -z"), Turn::Identity(), 0.5, 0));
+  ASSERT_TRUE(below);
+  EXPECT_EQ(below->second, Vec3(-Vec3::UnitZ()));
 }
 
 }  // namespace

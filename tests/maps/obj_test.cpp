@@ -39,6 +39,8 @@ TEST_F(Obj, HasEveryFaceHoweverItIsWritten) {
   EXPECT_EQ(thin->lines, (std::vector<std::uint32_t>{5, 6, 7, 7, 8, 8}));
   EXPECT_EQ(thin->notes.at(0), "5 triangles have no area: they are lines or points of the map");
   refused("c.obj", v + "f 1 2\n", ":5: f of 2 corners, at least 3");
+  for (const std::string what : {"fo", "F", "face"})
+    refused("c.obj", v + "f 1 2 3\n" + what + " 1 2 4\n", ":6: '" + what + "' is no statement");
   refused("c.obj", v + "f 1 2 0\n", ":5: '0' names none of 4 vertices");
   refused("c.obj", v + "f 1 2 -5\n", ":5: '-5' names none of 4 vertices");
   refused("c.obj", v + "f 1 2 x\n", ":5: 'x' names none of 4 vertices");

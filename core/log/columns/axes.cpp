@@ -184,8 +184,9 @@ std::optional<std::pair<std::string, Vec3>> flat_height(const FlightLog& log) {
     return median(std::move(apart));
   };
   const double z = off("z_m"), x = off("x_m"), y = off("y_m");
-  const double other = std::max(x, y);
-  if (z > kAtFloor || other < kAloft) return std::nullopt;
+  if (const double most = std::ranges::max(log.column("z_m")); most < -kAtFloor && z > kAloft)
+    return std::pair{"z is below " + formatted("%.2f", most) + " m throughout", Vec3(-Vec3::UnitZ())};
+  if (z > kAtFloor || std::max(x, y) < kAloft) return std::nullopt;
   const bool is_y = y >= x;
   const double middle = median(log.column(is_y ? "y_m" : "x_m"));
   return std::pair{"z is within " + formatted("%.2g", z) + " m of 0, and " + (is_y ? "y" : "x") + " is at " +

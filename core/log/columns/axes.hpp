@@ -46,8 +46,8 @@ std::optional<UpAxes> up_axes(const FlightLog& log);
 /// Which of the body's axes is up on the mean, where `up` is the world's. Nothing: there is no attitude, or none is.
 std::optional<Vec3> body_up(const FlightLog& log, const Vec3& up);
 
-/// What positions alone make of it: a sentence, where z stays at 0 while the craft is higher along another axis; the
-/// axis that may be up. Without doubt: nothing.
+/// What positions alone make of it: a sentence, where z stays at 0 while the craft is higher along another axis, or is
+/// below 0 throughout; the axis that may be up. Without doubt: nothing.
 std::optional<std::pair<std::string, Vec3>> flat_height(const FlightLog& log);
 
 }  // namespace backwash::log

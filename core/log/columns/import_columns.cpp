@@ -229,10 +229,15 @@ tl::expected<FlightLog, LogError> import_columns(const std::string& path, const 
   auto theirs = in_their_axes(*table, path, map, notes);
   if (!theirs) return theirs;
   if (const auto why = wrong_axes(*theirs, map); !why.empty()) return bad(why);
+  const std::size_t all = theirs->t_s.size();
   auto log = in_our_axes(std::move(*theirs), map);
   if (!log) return bad(log.error());
   const auto left_out = leave_out_doubted(*log);
   if (!left_out) return bad(left_out.error());
+  const std::size_t lost = all - std::min(all, log->t_s.size());
+  if (notes && lost * 50 > all)
+    notes->push_back(path + ": " + std::to_string(lost) + " of " + std::to_string(all) +
+                     " rows left out: beside a gap of the positions");
   if (notes)
     for (const auto& what : *left_out) notes->push_back(path + ": " + what);
   return left_out->empty() ? std::move(*log) : with_motion(std::move(*log));

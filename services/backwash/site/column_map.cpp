@@ -89,7 +89,7 @@ std::vector<std::string> words(const std::string& name) {
 }
 
 /// A column that is called so; else one whose name ends so, after an object's; else one with names of frames between
-/// the quantity and the axis. The first of each.
+/// the quantity and the axis. The first of each; none whose name is there twice.
 std::optional<std::string> called(const log::ForeignTable& table, const std::vector<const char*>& names, char with) {
   using Fits = bool (*)(const std::string& column, const std::string& name);
   constexpr Fits kFits[] = {[](const std::string& column, const std::string& name) {
@@ -107,7 +107,7 @@ std::optional<std::string> called(const log::ForeignTable& table, const std::vec
   for (const Fits fits : kFits)
     for (const char* name : names)
       for (const auto& column : table.columns)
-        if (fits(column.name, filled(name, with))) return column.name;
+        if (!table.find(column.name + " (2)") && fits(column.name, filled(name, with))) return column.name;
   return std::nullopt;
 }
 
@@ -156,10 +156,11 @@ std::string unit_of(const std::string& ours, const log::ForeignTable::Column& th
   return "";
 }
 
-std::string written(const ColumnMap& map, const std::vector<std::string>& doubts) {
+std::string written(const ColumnMap& map, const std::vector<std::string>& doubts, bool told) {
   std::string text = "# A guess from the names of the columns";
   text += doubts.empty() ? ", and nothing in the numbers contradicts it.\n" : ". The numbers contradict it:\n";
   for (const auto& doubt : doubts) text += "#   " + doubt + "\n";
+  if (!told) text += "# Which axes are up the flight does not tell: [frame] is a guess; check it.\n";
   text += "[frame]\n";
   if (map.world) text += "world = \"" + log::called(*map.world, log::named_worlds()) + "\"\n";
   if (map.body) text += "body = \"" + log::called(*map.body, log::named_bodies()) + "\"\n";
@@ -205,12 +206,15 @@ tl::expected<std::vector<std::string>, std::string> titles_of(const log::Foreign
 /// knows.
 std::vector<std::pair<std::optional<log::Turn>, std::optional<log::Turn>>> turns_for(const log::FlightLog& theirs) {
   if (const auto up = log::up_axes(theirs)) return {{log::upright_world(up->world), log::upright_body(up->body)}};
-  const auto up_body = log::body_up(theirs, Vec3::UnitZ());
   if (log::flat_height(theirs)) return {{std::nullopt, std::nullopt}};
-  if (up_body && std::abs(up_body->z()) < 1) return {{log::Turn::Identity(), log::upright_body(*up_body)}};
   std::vector<std::pair<std::optional<log::Turn>, std::optional<log::Turn>>> all;
-  for (const auto& world : log::named_worlds())
+  for (const auto& world : log::named_worlds()) {
+    if (const auto body = log::body_up(theirs, world.turn.transpose() * Vec3::UnitZ())) {
+      all.emplace_back(world.turn, log::upright_body(*body));
+      continue;
+    }
     for (const auto& body : log::named_bodies()) all.emplace_back(world.turn, body.turn);
+  }
   return all;
 }
 
@@ -291,6 +295,7 @@ tl::expected<std::string, log::LogError> proposed_column_map(const std::string& 
   }
   ColumnMap best;
   std::optional<std::vector<std::string>> doubts;
+  bool told = false;
   for (const auto& [kind, unit] : kinds) {
     ColumnMap map = base;
     for (const char c : std::string(kind.empty() ? "" : "xyz"))
@@ -300,6 +305,7 @@ tl::expected<std::string, log::LogError> proposed_column_map(const std::string& 
       if (!doubts) best = map, doubts = {theirs.error().message};
       continue;
     }
+    told = told || log::up_axes(*theirs);
     for (const auto& [world, body] : turns_for(*theirs)) {
       map.world = world;
       map.body = body;
@@ -315,7 +321,7 @@ tl::expected<std::string, log::LogError> proposed_column_map(const std::string& 
       }
     }
   }
-  return written(best, *doubts);
+  return written(best, *doubts, told);
 }
 
 }  // namespace backwash::services
