@@ -265,7 +265,8 @@ Read read_ply(const std::string& path, std::string_view content) {
     geometry.taken = geometry.points.size();
   }
   if (numbers.left() > 0)
-    geometry.notes.push_back(std::to_string(numbers.left()) + " bytes after the last element were not read");
+    return corrupt(path, ": holds " + std::to_string(numbers.left()) +
+                             " bytes behind the last element that its header counts; mend the counts");
   return geometry;
 }
 

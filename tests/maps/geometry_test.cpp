@@ -106,6 +106,7 @@ TEST_F(Geometries, AreKnownByTheirContentWhateverTheirNames) {
       "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 "
       "3\n";
   EXPECT_EQ(read("cloud.obj", ply)->points, (std::vector<Vec3>{{1, 2, 3}}));
+  refused("more.ply", ply + "\n4 5 6\n", "behind the last element that its header counts");
   refused("flight.mcap", "#ROSBAG V2.0\n", "rosbags-convert --src " + folder_ + "flight.bag");
   refused("bag.mcap", std::string("SQLite format 3\0", 16), "ros2 bag convert");
   refused("room.ply", "version https://git-lfs.github.com/spec/v1\n", "git lfs pull");
