@@ -232,7 +232,7 @@ std::string field(const std::string& name) { return BACKWASH_SOURCE_DIR "/../sha
 
 TEST(DamagedLog, AFieldLogWithGapsOfItsNetworkIsReadToItsEnd) {
   const auto hurt = read(field("wifi_gaps.ulg")), whole = read(field("flight.ulg"));
-  if (hurt.empty()) GTEST_SKIP() << "no " << field("wifi_gaps.ulg");
+  if (hurt.empty()) GTEST_SKIP() << "data: no " << field("wifi_gaps.ulg");
   const auto read = decode_ulog(hurt), sound = decode_ulog(whole);
   ASSERT_TRUE(read) << read.error();
   ASSERT_TRUE(sound) << sound.error();

@@ -167,7 +167,7 @@ TEST(Validity, TheEstimatorAndCoreThatFlewAreTaken) {
 /// Files of users (shared/data/field); skipped by name where they are not there.
 TEST(Validity, FieldLogsAreReadOrLeftOutByName) {
   const std::string folder = BACKWASH_SOURCE_DIR "/../shared/data/field/";
-  if (!std::ifstream(folder + "flight.ulg")) GTEST_SKIP() << "no " << folder << "flight.ulg";
+  if (!std::ifstream(folder + "flight.ulg")) GTEST_SKIP() << "data: no " << folder << "flight.ulg";
   const auto invalid = read_recording(folder + "all_invalid.ulg");
   ASSERT_FALSE(invalid);
   EXPECT_NE(invalid.error().message.find("position along x and y is not valid in 100 %"), std::string::npos)

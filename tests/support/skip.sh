@@ -3,7 +3,7 @@
 # ./check forgot to install: that fails, with the command's words. tests/support/skipped.py asks for the kind.
 
 # skip KIND WORDS: right (the user's or the container's), device, kernel, network, stalled (this machine stood still); in a
-# GTEST_SKIP() also sanitizer.
+# GTEST_SKIP() also sanitizer, and data (files beside the tree are absent).
 skip() { echo "skipped: $1: ${*:2}"; exit 77; }
 # failed WORDS: the test fails.
 failed() { echo "$*" >&2; exit 1; }

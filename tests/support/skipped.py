@@ -11,7 +11,7 @@ import re
 import sys
 from xml.etree import ElementTree
 
-KINDS = ("right", "device", "kernel", "network", "stalled", "sanitizer")
+KINDS = ("right", "device", "kernel", "network", "stalled", "sanitizer", "data")
 REASON = re.compile(rf"(?:skipped: |Skipped\n)((?:{'|'.join(KINDS)}): .*)")
 
 

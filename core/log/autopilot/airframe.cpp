@@ -8,62 +8,49 @@
 namespace backwash::log {
 namespace {
 
-/// What one value of one number means: rotors of a multicopter, or another kind.
+/// What the values of one number mean, from `first` to `last`: rotors of a multicopter, or another kind.
 struct Meaning {
   std::string_view of;
-  int value;
-  int rotors;
+  int first, last, rotors;
   const char* other = nullptr;
 };
 
 constexpr const char *kWing = "a fixed wing", *kVtol = "a VTOL", *kRover = "a rover", *kHelicopter = "a helicopter";
 
 /// PX4's vehicle_status.msg and its module control_allocator, MAVLink's MAV_TYPE, ArduCopter's FRAME_CLASS.
-constexpr Meaning kMeanings[] = {
-    {"vehicle_type", 2, 0, kWing},
-    {"vehicle_type", 3, 0, kRover},
-    {"vehicle_type", 4, 0, "an airship"},
-    {"is_vtol", 1, 0, kVtol},
-    {"MAV_TYPE", 1, 0, kWing},
-    {"MAV_TYPE", 2, 4},
-    {"MAV_TYPE", 3, 0, kHelicopter},
-    {"MAV_TYPE", 4, 0, kHelicopter},
-    {"MAV_TYPE", 7, 0, "an airship"},
-    {"MAV_TYPE", 10, 0, kRover},
-    {"MAV_TYPE", 11, 0, "a boat"},
-    {"MAV_TYPE", 12, 0, "a submarine"},
-    {"MAV_TYPE", 13, 6},
-    {"MAV_TYPE", 14, 8},
-    {"MAV_TYPE", 15, 3},
-    {"MAV_TYPE", 19, 0, kVtol},
-    {"MAV_TYPE", 20, 0, kVtol},
-    {"MAV_TYPE", 21, 0, kVtol},
-    {"MAV_TYPE", 22, 0, kVtol},
-    {"MAV_TYPE", 23, 0, kVtol},
-    {"MAV_TYPE", 24, 0, kVtol},
-    {"MAV_TYPE", 25, 0, kVtol},
-    {"MAV_TYPE", 29, 12},
-    {"MAV_TYPE", 35, 10},
-    {"CA_AIRFRAME", 1, 0, kWing},
-    {"CA_AIRFRAME", 2, 0, kVtol},
-    {"CA_AIRFRAME", 3, 0, kVtol},
-    {"CA_AIRFRAME", 4, 0, kVtol},
-    {"CA_AIRFRAME", 5, 0, kRover},
-    {"CA_AIRFRAME", 6, 0, kRover},
-    {"CA_AIRFRAME", 10, 0, kHelicopter},
-    {"CA_AIRFRAME", 11, 0, kHelicopter},
-    {"CA_AIRFRAME", 12, 0, kHelicopter},
-    {"CA_AIRFRAME", 13, 0, kRover},
-    {"FRAME_CLASS", 2, 6},
-    {"FRAME_CLASS", 3, 8},
-    {"FRAME_CLASS", 4, 8},
-    {"FRAME_CLASS", 5, 6},
-    {"FRAME_CLASS", 6, 0, kHelicopter},
-    {"FRAME_CLASS", 7, 3},
-    {"FRAME_CLASS", 11, 0, kHelicopter},
-    {"FRAME_CLASS", 12, 12},
-    {"FRAME_CLASS", 14, 10},
-};
+constexpr Meaning kMeanings[] = {{"vehicle_type", 2, 2, 0, kWing},
+                                 {"vehicle_type", 3, 3, 0, kRover},
+                                 {"vehicle_type", 4, 4, 0, "an airship"},
+                                 {"is_vtol", 1, 1, 0, kVtol},
+                                 {"MAV_TYPE", 1, 1, 0, kWing},
+                                 {"MAV_TYPE", 2, 2, 4},
+                                 {"MAV_TYPE", 3, 4, 0, kHelicopter},
+                                 {"MAV_TYPE", 7, 7, 0, "an airship"},
+                                 {"MAV_TYPE", 10, 10, 0, kRover},
+                                 {"MAV_TYPE", 11, 11, 0, "a boat"},
+                                 {"MAV_TYPE", 12, 12, 0, "a submarine"},
+                                 {"MAV_TYPE", 13, 13, 6},
+                                 {"MAV_TYPE", 14, 14, 8},
+                                 {"MAV_TYPE", 15, 15, 3},
+                                 {"MAV_TYPE", 19, 25, 0, kVtol},
+                                 {"MAV_TYPE", 29, 29, 12},
+                                 {"MAV_TYPE", 35, 35, 10},
+                                 {"CA_AIRFRAME", 1, 1, 0, kWing},
+                                 {"CA_AIRFRAME", 2, 4, 0, kVtol},
+                                 {"CA_AIRFRAME", 5, 6, 0, kRover},
+                                 {"CA_AIRFRAME", 10, 12, 0, kHelicopter},
+                                 {"CA_AIRFRAME", 13, 13, 0, kRover},
+                                 {"FRAME_CLASS", 2, 2, 6},
+                                 {"FRAME_CLASS", 3, 4, 8},
+                                 {"FRAME_CLASS", 5, 5, 6},
+                                 {"FRAME_CLASS", 6, 6, 0, kHelicopter},
+                                 {"FRAME_CLASS", 7, 7, 3},
+                                 {"FRAME_CLASS", 8, 8, 1},
+                                 {"FRAME_CLASS", 9, 10, 2},
+                                 {"FRAME_CLASS", 11, 11, 0, kHelicopter},
+                                 {"FRAME_CLASS", 12, 12, 12},
+                                 {"FRAME_CLASS", 13, 13, 0, kHelicopter},
+                                 {"FRAME_CLASS", 14, 14, 10}};
 
 /// What ArduPilot's firmwares and frames call themselves in MSG.
 constexpr struct {
@@ -95,12 +82,13 @@ Airframe airframe_of(const TopicLog& topics) {
     if (const auto found = topics.parameters.find(name); found != topics.parameters.end())
       said[name] = static_cast<int>(found->second);
   Airframe frame;
-  for (const auto& [of, value, rotors, other] : kMeanings) {
-    if (said[std::string(of)] != value) continue;
+  for (const auto& [of, first, last, rotors, other] : kMeanings) {
+    const auto value = said[std::string(of)];
+    if (!value || *value < first || *value > last) continue;
     if (rotors > 0)
       frame.rotors = rotors;
     else if (frame.other.empty())
-      frame.other = std::string(other) + " (" + std::string(of) + " " + std::to_string(value) + ")";
+      frame.other = std::string(other) + " (" + std::string(of) + " " + std::to_string(*value) + ")";
   }
   if (const auto count = topics.parameters.find("CA_ROTOR_COUNT"); count != topics.parameters.end())
     if (count->second > 0) frame.rotors = static_cast<int>(count->second);
