@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 #include <tl/expected.hpp>
+#include <vector>
 
 #include "core/types/model.hpp"
 #include "core/types/vehicle.hpp"
@@ -16,9 +17,17 @@ struct ConfigError {
   std::string message;
 };
 
+/// A number in place of that of a file: "body.mass", 1.02.
+struct ChangedKey {
+  std::string key;
+  double value;
+};
+
 /// Reads a vehicle file (keys: docs/interfaces.md, "Vehicle file"); `builtin:quad-5in` and `builtin:quad-7in` name the
 /// two that ship. An unknown, missing or out-of-range key is an error. Of px4 k_p = P_pos·P_vel, k_d = P_vel.
 tl::expected<Vehicle, ConfigError> load_vehicle(const std::string& path);
+/// As if the file had these numbers.
+tl::expected<Vehicle, ConfigError> load_vehicle_with(const std::string& path, const std::vector<ChangedKey>& changed);
 
 /// Reads a model file (keys: docs/interfaces.md, "Model file"); `builtin:quad-5in` and `builtin:quad-7in` ship. Of the
 /// study's `[[extension.term]]` the `effect` list is read (ModelEffect); the rest of a term is the study's own.

@@ -145,6 +145,18 @@ ConfigError StrictTable::error(std::string_view path, const std::string& what_wo
   return {ConfigError::Kind::invalid, message.str()};
 }
 
+void StrictTable::change(std::string_view path, double value) {
+  toml::table* table = &root_;
+  for (auto dot = path.find('.'); dot != std::string_view::npos; dot = path.find('.')) {
+    table->insert(path.substr(0, dot), toml::table());
+    auto* below = table->get(path.substr(0, dot))->as_table();
+    if (!below) break;  // a value stands where a table would: the whole path is refused as unknown
+    table = below;
+    path.remove_prefix(dot + 1);
+  }
+  table->insert_or_assign(path, value);
+}
+
 std::optional<std::vector<double>> StrictTable::numbers(std::string_view path, std::string_view key) const {
   const toml::table* table = root_.at_path(path).as_table();
   const toml::node* entry = table ? table->get(key) : nullptr;

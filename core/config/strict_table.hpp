@@ -62,6 +62,8 @@ class StrictTable {
   /// Stores every value. Error: the first unknown key, wrong type, value out of range (NaN is in no range) or missing
   /// key.
   tl::expected<void, ConfigError> read(std::span<const Key> keys) const;
+  /// As if the file had this number there; a table of the path that it lacks is added.
+  void change(std::string_view path, double value);
   /// A string that is not empty and holds no control characters.
   tl::expected<std::string, ConfigError> text(std::string_view path) const;
   /// true or false.

@@ -99,9 +99,10 @@ std::string vehicle_file_keys() {
   return markdown(vehicle_keys(vehicle, px4));
 }
 
-tl::expected<Vehicle, ConfigError> load_vehicle(const std::string& path) {
-  const auto file = StrictTable::open(path, ".vehicle.toml");
+tl::expected<Vehicle, ConfigError> load_vehicle_with(const std::string& path, const std::vector<ChangedKey>& changed) {
+  auto file = StrictTable::open(path, ".vehicle.toml");
   if (!file) return tl::unexpected(file.error());
+  for (const auto& [key, value] : changed) file->change(key, value);
   Vehicle vehicle;
   Px4Gains px4;
   if (auto read = file->read(vehicle_keys(vehicle, px4)); !read) return tl::unexpected(read.error());
@@ -119,5 +120,7 @@ tl::expected<Vehicle, ConfigError> load_vehicle(const std::string& path) {
   if (auto sound = check_together(*file, vehicle); !sound) return tl::unexpected(sound.error());
   return vehicle;
 }
+
+tl::expected<Vehicle, ConfigError> load_vehicle(const std::string& path) { return load_vehicle_with(path, {}); }
 
 }  // namespace backwash::config

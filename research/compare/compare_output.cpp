@@ -90,7 +90,8 @@ Json to_json(const report::Comparison& c) {
                       {"solved", std::move(solved)},
                       {"contacts", std::move(contacts)}});
   }
-  for (const auto& demand : c.demands) demands.push_back({{"text", demand.text}, {"met", demand.met}});
+  for (const auto& demand : c.demands)
+    demands.push_back({{"text", demand.text}, {"met", demand.met}, {"open", demand.open}});
   for (const auto& gap : c.gaps) gaps.push_back(to_json(gap));
   return {{"seed", c.seed},
           {"flights", c.flights},
@@ -131,7 +132,8 @@ void print_text(const report::Comparison& c) {
         gap.vehicle.c_str(), gap.flights, gap.contacts, gap.outside, gap.samples, gap.largest_ratio.x(),
         gap.largest_ratio.y(), gap.largest_ratio.z());
   }
-  for (const auto& demand : c.demands) std::printf("%-7s %s\n", demand.met ? "met" : "MISSED", demand.text.c_str());
+  for (const auto& demand : c.demands)
+    std::printf("%-7s %s\n", demand.met ? "met" : demand.open ? "OPEN" : "MISSED", demand.text.c_str());
 }
 
 std::string to_csv(const report::Comparison& c) {

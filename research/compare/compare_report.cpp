@@ -101,8 +101,11 @@ std::string by_scene(const Comparison& c) {
 std::string demanded(const Comparison& c) {
   std::string html;
   for (const auto& demand : c.demands)
-    html += std::string("<tr><td class=\"") + (demand.met ? "passed\">met" : "failed\">missed") + "</td><td>" +
-            escaped(demand.text) + "</td></tr>\n";
+    html += std::string("<tr><td class=\"") +
+            (demand.met    ? "passed\">met"
+             : demand.open ? "\">open"
+                           : "failed\">missed") +
+            "</td><td>" + escaped(demand.text) + "</td></tr>\n";
   return section(
       "Demanded of the proposed method",
       "Jerk² counts as below when its whole interval is; margins with more contacts are not held against it.",

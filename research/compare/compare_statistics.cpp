@@ -178,13 +178,15 @@ std::vector<Demand> demands(const Table& table, const std::vector<CompareMethod>
       continue;
     }
     const Interval& jerk2 = row.on_common.total[kJerk2];
+    const bool open = row.on_common.pairs > 0 && jerk2.low < 1 && jerk2.high >= 1;
     list.push_back({row.on_common.pairs == 0 ? formatted("jerk2 below %s: no pair that all solve", row.method.c_str())
                     : !jerk2.known()
                         ? formatted("jerk2 below %s: one pair that all solve, ratio %.2f, says nothing of others",
                                     row.method.c_str(), jerk2.value)
-                        : formatted("jerk2 below %s on %zu pairs that all solve: ratio %.2f (%.2f to %.2f)",
-                                    row.method.c_str(), row.on_common.pairs, jerk2.value, jerk2.low, jerk2.high),
-                    row.on_common.pairs > 0 && jerk2.high < 1});
+                        : formatted("jerk2 below %s%s %zu pairs that all solve: ratio %.2f (%.2f to %.2f)",
+                                    row.method.c_str(), open ? " cannot be told with" : " on", row.on_common.pairs,
+                                    jerk2.value, jerk2.low, jerk2.high),
+                    row.on_common.pairs > 0 && jerk2.high < 1, open || !jerk2.known()});
     const std::size_t without = first.pairs - first.solved, other = row.pairs - row.solved;
     list.push_back({formatted("no path no more often than %s: %zu against %zu of %zu pairs", row.method.c_str(),
                               without, other, row.pairs),

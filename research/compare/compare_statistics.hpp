@@ -69,6 +69,7 @@ Table tabulate(std::span<const SceneComparison> scenes, const std::vector<Compar
 struct Demand {
   std::string text;
   bool met;
+  bool open = false;  ///< not met, and not missed: these pairs cannot tell
 };
 /// No contacts, no sample outside its set, and against every margin with no more contacts: jerk² lower on the pairs
 /// that all solve (the whole interval of the ratio of totals below 1), no-path no more often.

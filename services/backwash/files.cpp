@@ -71,7 +71,9 @@ Model read_model(const std::string& path) { return read_and_remember(path, confi
 std::vector<SimulationTerm> read_simulation(const std::string& path) {
   return read_configuration(config::load_simulation(path));
 }
-Vehicle read_vehicle(const std::string& path) { return read_and_remember(path, config::load_vehicle); }
+Vehicle read_vehicle(const std::string& path, const std::vector<config::ChangedKey>& changed) {
+  return read_and_remember(path, [&](const std::string& file) { return config::load_vehicle_with(file, changed); });
+}
 
 std::pair<Vehicle, Model> read_both(const std::string& vehicle_path, const std::string& model,
                                     std::optional<double> risk) {

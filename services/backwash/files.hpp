@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/config/config.hpp"
 #include "core/log/columns/flight_log.hpp"
 #include "core/map/occupancy_grid.hpp"
 #include "core/plan/world/world.hpp"
@@ -26,7 +27,7 @@ map::OccupancyGrid read_map(const std::string& path);
 Model read_model(const std::string& path);
 /// What an extended model adds to the simulation; nothing for others.
 std::vector<SimulationTerm> read_simulation(const std::string& path);
-Vehicle read_vehicle(const std::string& path);
+Vehicle read_vehicle(const std::string& path, const std::vector<config::ChangedKey>& changed = {});
 /// Both, with the model of a stated risk if there is one (plan::model_for). `model`: as model_of() takes it.
 std::pair<Vehicle, Model> read_both(const std::string& vehicle_path, const std::string& model,
                                     std::optional<double> risk);

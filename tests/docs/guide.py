@@ -21,6 +21,11 @@ def commands(text: str) -> str:
     return "\n".join(re.findall(r"^```\n(.*?)^```$", text, re.M | re.S))
 
 
+def printed(text: str) -> list[str]:
+    """What the section "Read a study" says in `…` with a colon and a blank: lines that its commands print."""
+    return re.findall(r"`([^`\n]+: [^`\n]+)`", sections(text)["Read a study"])
+
+
 def literals(code: str) -> list[str]:
     """String literals, adjacent ones as one."""
     return ["".join(re.findall(LITERAL, run[0])) for run in re.finditer(rf"(?:{LITERAL}\s*)+", code)]
@@ -57,6 +62,8 @@ def main() -> int:
         stem = re.sub(r"\.(horizontal|vertical)$", "", key)
         if stem not in named and not stem.startswith("controller.px4"):
             wrong.append(f"the guide does not say what a wrong {stem} does")
+    if len(printed(page)) < 3:
+        wrong.append("Read a study says hardly anything that its commands print")
     if commands(page).count("\n") < 30:
         wrong.append("the guide has hardly any commands")
     for line in dict.fromkeys(wrong):

@@ -40,6 +40,7 @@ MAY = {
                          STUDY + "windows", STUDY + "calibrate", STUDY + "effects", STUDY + "inference"],
     STUDY + "design": ["core/types", "core/map", "core/plan", "core/log", STUDY + "windows", STUDY + "effects",
                        STUDY + "inference", STUDY + "findings"],
+    STUDY + "before_after": ["core/types", "core/log", "core/report", STUDY + "windows", STUDY + "findings"],
     "firmware_bridge/autopilots": [],
     "firmware_bridge": ["core/types"],
     "services/parallel": [],

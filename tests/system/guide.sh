@@ -24,6 +24,10 @@ bash -c 'trap "kill \$(jobs -p) 2>/dev/null || true" EXIT; set -eux -o pipefail;
   echo "guide: a command fails: $(grep '^++ [a-z]' "$work/said" | tail -n 1)" >&2
   exit 1
 }
+# What a section says in `…` that its commands print ("verdict: flights", a headline, a measure) is what they print.
+while IFS= read -r line; do
+  grep -qF -- "$line" "$work/said" || { echo "guide: nothing prints '$line'" >&2; exit 1; }
+done < <(PYTHONPATH=$source_dir/tests/docs python3 -c 'import guide, pathlib, sys; print("\n".join(guide.printed(pathlib.Path(sys.argv[1]).read_text())))' "$source_dir/docs/guide.md")
 made=$(grep -oE '(--report|--out|-o|--mcap) [a-z0-9-]+(\.[a-z]+)+' "$work/guide" | awk '{print $2}' | sort -u)
 [[ $(wc -w <<<"$made") -ge 12 ]] || { echo "guide: hardly anything is made" >&2; exit 1; }
 for file in $made flight.mcap; do

@@ -122,11 +122,15 @@ std::string tics(const Frame& f) {
   if (f.x.words.empty())
     for (const double value : steps(f.x.low, f.x.high, f.width / 110)) across(value, said(f.x, value));
   for (std::size_t n = 0; n < f.x.words.size(); ++n) across(static_cast<double>(n) + 1, f.x.words[n]);
-  for (const double value : steps(f.y.low, f.y.high, f.height / 45)) {
-    const double y = f.at_y(value);
-    svg += formatted("<path d=\"M%.1f %.1fH%.1f\"/>", f.left, y, right) +
-           text(f.left - 6, y + 4, "text-anchor=\"end\"", said(f.y, value));
-  }
+  const auto along = [&](double value) {
+    svg += formatted("<path d=\"M%.1f %.1fH%.1f\"/>", f.left, f.at_y(value), right);
+    return f.at_y(value);
+  };
+  if (f.y.words.empty())
+    for (const double value : steps(f.y.low, f.y.high, f.height / 45))
+      svg += text(f.left - 6, along(value) + 4, "text-anchor=\"end\"", said(f.y, value));
+  for (std::size_t n = 0; n < f.y.words.size(); ++n)
+    svg += text(f.left + 6, along(static_cast<double>(n) + 1) - 6, "text-anchor=\"start\"", f.y.words[n]);
   return svg + "</g>";
 }
 

@@ -43,7 +43,7 @@ struct Axis {
   /// Range; where low is above high, that of what is drawn.
   double low = std::numeric_limits<double>::infinity(), high = -low;
   bool logarithmic = false;             ///< places are common logarithms
-  std::vector<std::string> words = {};  ///< at 1, 2, … instead of numbers
+  std::vector<std::string> words = {};  ///< at 1, 2, … instead of numbers; of y within the chart
 };
 
 struct Chart {

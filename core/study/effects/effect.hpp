@@ -167,7 +167,8 @@ Remedy by_extension(const FittedForm& fitted);
 Remedy with_craft(std::string words);
 /// A function for Effect::remedy that always says so.
 std::function<Remedy(const FittedForm&, const Vehicle&)> always(RemedyIn in, std::string words);
-Remedy in_vehicle(std::vector<Remedy::Set> set);
+/// "LEAD: change body.mass to 1.02 in the vehicle file."; `lead`: what the flights say, in one clause.
+Remedy in_vehicle(std::vector<Remedy::Set> set, const std::string& lead);
 /// "rotor 3"; of a form whose scale is a rotor's number.
 std::string rotor_of(const FittedForm& fitted);
 

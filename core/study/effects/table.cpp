@@ -4,12 +4,12 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <random>
 #include <stdexcept>
 
 #include "core/study/effects/effect_rules.hpp"
 #include "core/study/effects/regressors.hpp"
+#include "core/types/formatted.hpp"
 
 namespace backwash::study {
 
@@ -168,15 +168,11 @@ std::function<Remedy(const FittedForm&, const Vehicle&)> always(RemedyIn in, std
   return [remedy = Remedy{in, {}, std::move(words)}](auto&, auto&) { return remedy; };
 }
 
-Remedy in_vehicle(std::vector<Remedy::Set> set) {
+Remedy in_vehicle(std::vector<Remedy::Set> set, const std::string& lead) {
   std::string words;
-  for (const auto& [key, from, to] : set) {
-    char text[128];
-    std::snprintf(text, sizeof text, "%s %s from %.3g to %.3g", words.empty() ? "Change" : " and", key.c_str(), from,
-                  to);
-    words += text;
-  }
-  return {RemedyIn::vehicle, std::move(set), words + " in the vehicle file."};
+  for (const auto& [key, from, to] : set)
+    words += formatted("%s %s to %.3g", words.empty() ? "change" : " and", key.c_str(), to);
+  return {RemedyIn::vehicle, std::move(set), lead + ": " + words + " in the vehicle file."};
 }
 
 std::string rotor_of(const FittedForm& fitted) {

@@ -162,7 +162,8 @@ std::pair<Vec3, Vec3> farthest(const std::vector<Vec3>& places, const std::vecto
 }  // namespace
 
 Consequence consequence(const StudyResult& result, const Observations& seen, const Model& model, const Vehicle& vehicle,
-                        std::span<const map::OccupancyGrid* const> grids, const Parallel& parallel) {
+                        std::span<const map::OccupancyGrid* const> grids, const std::optional<Vehicle>& corrected,
+                        const Parallel& parallel) {
   Consequence c;
   const Added added = held_out(result, seen);
   c.before.inside = inside(seen, model.bound, nullptr);
@@ -170,30 +171,38 @@ Consequence consequence(const StudyResult& result, const Observations& seen, con
   const Model after = extended(model, result, seen);
   const auto by_map = places_of(seen, grids);
   for (const auto& [grid, places] : by_map) c.places += places.size();
+  struct Way {
+    FlightOutcome& outcome;
+    const Model& model;
+    const Vehicle& vehicle;
+    std::vector<reach::HoverSet> sets = {};
+  };
+  std::vector<Way> ways{{c.before, model, vehicle}, {c.after, after, vehicle}};
+  if (corrected) ways.push_back({c.corrected.emplace(), model, *corrected});
   if (grids.empty() || by_map.empty()) {
-    describe(c.before, sets_in_the_open(model, vehicle));
-    describe(c.after, sets_in_the_open(after, vehicle));
+    for (auto& way : ways) describe(way.outcome, sets_in_the_open(way.model, way.vehicle));
     return c;
   }
-  std::vector<reach::HoverSet> sets, sets_after;
   double longest = kRules.least_route;
   for (const auto& [grid, places] : by_map) {
-    const auto world = plan::build_world(*grid, model, vehicle, reach::Method::tight, std::nullopt, parallel);
-    const auto extended_world = plan::build_world(*grid, after, vehicle, reach::Method::tight, std::nullopt, parallel);
-    const auto here = sets_at(*world, places), here_after = sets_at(*extended_world, places);
-    sets.insert(sets.end(), here.begin(), here.end());
-    sets_after.insert(sets_after.end(), here_after.begin(), here_after.end());
-    const auto [start_W, goal_W] = farthest(places, here);
-    if ((goal_W - start_W).norm() <= longest) continue;
-    longest = (goal_W - start_W).norm();
-    std::tie(c.start_W, c.goal_W) = std::pair(start_W, goal_W);
-    try_plan(c.before, *world, start_W, goal_W);
-    try_plan(c.after, *extended_world, start_W, goal_W);
+    std::optional<std::pair<Vec3, Vec3>> ends;  // of the plan: where it is safe before
+    for (auto& way : ways) {
+      const auto world = plan::build_world(*grid, way.model, way.vehicle, reach::Method::tight, std::nullopt, parallel);
+      const auto here = sets_at(*world, places);
+      way.sets.insert(way.sets.end(), here.begin(), here.end());
+      if (!ends) ends = farthest(places, here);
+      if (const auto& [start_W, goal_W] = *ends; (goal_W - start_W).norm() > longest)
+        try_plan(way.outcome, *world, start_W, goal_W);
+    }
+    if (const double length = (ends->second - ends->first).norm(); length > longest) {
+      longest = length;
+      std::tie(c.start_W, c.goal_W) = *ends;
+    }
   }
-  describe(c.before, sets);
-  describe(c.after, sets_after);
-  c.before.safe = safe_share(sets);
-  c.after.safe = safe_share(sets_after);
+  for (auto& way : ways) {
+    describe(way.outcome, way.sets);
+    way.outcome.safe = safe_share(way.sets);
+  }
   return c;
 }
 

@@ -27,6 +27,7 @@ struct FlightOutcome {
 
 struct Consequence {
   FlightOutcome before, after;
+  std::optional<FlightOutcome> corrected = {};  ///< model as before, vehicle file as the remedies say; `inside` is 0
   std::size_t places = 0;
   Vec3 start_W = Vec3::Zero(), goal_W = Vec3::Zero();  ///< of the plan
 };
@@ -34,8 +35,10 @@ struct Consequence {
 /// Before and after the accepted causes joined the model. `inside` after: with parameters fitted without the window's
 /// flight. Hover sets: at up to 60 of the flown places, of worlds with the maps, or without any from Σ_0 alone. The
 /// plan: between the two places of one map farthest apart that are safe in the world before. `grids`: of each flight,
-/// or empty. Two worlds are built of each map: seconds of a large one.
+/// or empty. `corrected`: the vehicle file as its remedies say, or nothing. Two or three worlds are built of each
+/// map: seconds of a large one.
 Consequence consequence(const StudyResult& result, const Observations& seen, const Model& model, const Vehicle& vehicle,
-                        std::span<const map::OccupancyGrid* const> grids, const Parallel& parallel = run_serial);
+                        std::span<const map::OccupancyGrid* const> grids,
+                        const std::optional<Vehicle>& corrected = std::nullopt, const Parallel& parallel = run_serial);
 
 }  // namespace backwash::study

@@ -41,22 +41,9 @@ std::string verdict_sentence(const StudyResult& result, const Observations& seen
   }
   const std::string of =
       " (" + std::to_string(seen.flights) + " flights, " + std::to_string(seen.windows.size()) + " windows of 2 s)";
-  switch (result.verdict) {
-    case StudyVerdict::cause_found:
-      return "The simulation misses " + names + of + "; with it, flights that were not fitted are likelier by " +
-             number(result.causes.front().gain.held_out_nats) +
-             " nats. A nat is a factor e in odds: 3 nats are 20 to 1, 7 are 1,000 to 1.";
-    case StudyVerdict::cannot_distinguish:
-      return "The simulation misses something that these flights cannot tell apart: " + names + of + ".";
-    case StudyVerdict::unknown_structure:
-      return "The simulation is wrong along " + result.unknown.front().along + ", and no known cause fits" + of + ".";
-    case StudyVerdict::insufficient:
-      return "Too little to name a cause: " + too_few(seen);
-    default:
-      return "Nothing found that the simulation gets wrong" + of + ", with " +
-             std::to_string(result.not_tested.size()) + " of " + std::to_string(effects().size()) +
-             " causes not tested.";
-  }
+  if (!names.empty()) return "The simulation misses " + names + of + ".";
+  return std::to_string(result.not_tested.size()) + " of " + std::to_string(effects().size()) +
+         " causes were not tested" + of + ".";
 }
 
 /// Whether the windows differ in it by more than rounding.
@@ -139,13 +126,13 @@ std::string acting_rows(const NamedCause& cause, const std::vector<std::string>&
 std::string figures(const NamedCause& cause, const PageContext& context) {
   const auto& g = cause.gain;
   std::string text = acting_rows(cause, context.logs);
-  if (context.read_vehicle) text += row("What to change", remedy_of(cause, *context.read_vehicle).words);
+  text += row("What to change", remedy_of(cause, context.read_vehicle).words);
   for (const auto& e : cause.found.parameters)
     text += row(spoken(e.name), number(e.value) + "  [" + number(e.low) + ", " + number(e.high) + "] at 95 %");
-  text += row("The size", beforehand(cause.found));
   if (!cause.extrapolated.empty()) text += row("The size is extrapolated", cause.extrapolated);
-  text += row("Probability of as much by chance, over everything tried", number(cause.found.p));
-  text += row("Gain on flights not fitted", number(g.held_out_nats) + " nats  [" + number(g.low_nats) + ", " +
+  std::string sure = row("The size", beforehand(cause.found));
+  sure += row("Probability of as much by chance, over everything tried", number(cause.found.p));
+  sure += row("Gain on flights not fitted", number(g.held_out_nats) + " nats  [" + number(g.low_nats) + ", " +
                                                 number(g.high_nats) + "]: odds of " + odds(g.held_out_nats));
   for (const auto& c : g.channels)
     text += row(std::string("Error of ") + channel_name(c.channel) + ", before and after, flights not fitted",
@@ -158,7 +145,8 @@ std::string figures(const NamedCause& cause, const PageContext& context) {
     text += row("Not told from " + spoken(s.rival),
                 "fly next: " + s.manoeuvre +
                     (s.expected_nats ? " (" + number(*s.expected_nats) + " nats expected from 12 flights)" : ""));
-  return report::table(text);
+  return report::table(text) + "<details><summary>How sure: odds and nats (3 nats are 20 to 1)</summary>" +
+         report::table(sure) + "</details>\n";
 }
 
 std::string share(double value) { return number(100 * value) + " %"; }
@@ -169,29 +157,41 @@ std::string plan_text(const FlightOutcome& o) {
          number(100 * o.flown->min_clearance_m) + " cm clear";
 }
 
-/// What field, reach and plan make of the causes.
+/// What field, reach and plan make of the remedies in the vehicle file, and apart of the extended model.
 std::string consequence_section(const Consequence& c) {
-  const FlightOutcome &b = c.before, &a = c.after;
-  std::string text = report::heads("", "before", "after");
-  const auto line = [&](const std::string& name, const std::string& before, const std::string& after) {
-    text += row(name, before, after);
-  };
-  line("Measured samples inside the bound, flights not fitted", share(b.inside), share(a.inside));
-  using Sizes = FlightOutcome::HoverSizes;
-  const auto sizes = [](const FlightOutcome& o, double Sizes::*median, double Sizes::*most) {
-    if (!o.hover) return std::string("none is bounded");
-    return number(100 * ((*o.hover).*median)) + " (" + number(100 * ((*o.hover).*most)) + ") cm";
-  };
-  line("Hover sets: centre off its set-point, median (95 %)", sizes(b, &Sizes::shift_median, &Sizes::shift_95),
-       sizes(a, &Sizes::shift_median, &Sizes::shift_95));
-  line("Hover sets: largest half width, median (95 %)", sizes(b, &Sizes::extent_median, &Sizes::extent_95),
-       sizes(a, &Sizes::extent_median, &Sizes::extent_95));
-  if (b.safe && a.safe) line("Flown places where hovering is safe", share(*b.safe), share(*a.safe));
-  if (b.plan) {
-    const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };
-    line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text(b), plan_text(a));
+  std::vector<const FlightOutcome*> ways{&c.before};
+  std::string heads = "<thead><tr><th></th><th>now</th>";
+  if (c.corrected) {
+    ways.push_back(&*c.corrected);
+    heads += "<th>file corrected</th>";
   }
-  return report::section("What it changes for a flight", report::escaped(cost_sentence(c)), report::table(text));
+  ways.push_back(&c.after);
+  std::string text = heads + "<th>extended model</th></tr></thead>\n";
+  const auto line = [&](const std::string& name, const auto& of) {
+    text += "<tr><th>" + report::escaped(name) + "</th>";
+    for (const auto* way : ways) text += "<td>" + report::escaped(of(*way)) + "</td>";
+    text += "</tr>\n";
+  };
+  using Sizes = FlightOutcome::HoverSizes;
+  const auto sizes = [](double Sizes::*median, double Sizes::*most) {
+    return [=](const FlightOutcome& o) {
+      return o.hover ? number(100 * ((*o.hover).*median)) + " (" + number(100 * ((*o.hover).*most)) + ") cm"
+                     : std::string("none is bounded");
+    };
+  };
+  line("Hover sets: centre off its set-point, median (95 %)", sizes(&Sizes::shift_median, &Sizes::shift_95));
+  line("Hover sets: largest half width, median (95 %)", sizes(&Sizes::extent_median, &Sizes::extent_95));
+  if (c.before.safe)
+    line("Flown places where hovering is safe", [](const FlightOutcome& o) { return share(o.safe.value_or(0)); });
+  if (c.before.plan) {
+    const auto at = [](const Vec3& p) { return number(p.x()) + ", " + number(p.y()) + ", " + number(p.z()); };
+    line("Plan from " + at(c.start_W) + " to " + at(c.goal_W), plan_text);
+  }
+  line("Measured samples inside the bound, flights not fitted",
+       [&](const FlightOutcome& o) { return c.corrected && &o == &*c.corrected ? std::string() : share(o.inside); });
+  std::string words = correction_sentence(c);
+  words += (words.empty() ? "" : " ") + cost_sentence(c);
+  return report::section("What it costs", report::escaped(words), report::table(text));
 }
 
 /// Whether what the accepted causes leave depends on something.
@@ -248,18 +248,20 @@ std::string limits_sections(const StudyResult& result, const Observations& seen)
 
 std::string study_page(const StudyResult& result, const Observations& seen, const PageContext& context) {
   report::PageData data = context.data;
-  std::string page = "<h1>What the simulation gets wrong</h1>\n", beside;
-  if (context.height) beside = height_sentence(*context.height);
-  if (!beside.empty()) beside.insert(0, " ");
-  page +=
-      "<p class=\"context\">Map " + report::escaped(context.map.empty() ? "none" : context.map) + ", vehicle " +
-      report::escaped(context.vehicle) + ", model " + report::escaped(context.model) + "; backwash " +
-      report::escaped(context.version) + "</p>\n" + context.first + "<p class=\"verdict " +
-      (result.verdict == StudyVerdict::cause_found || (result.verdict == StudyVerdict::nothing_found && beside.empty())
-           ? "passed"
-           : "failed") +
-      "\">" + (context.rotors ? report::escaped(rotor_sentence(*context.rotors)) + " " : "") +
-      report::escaped(verdict_sentence(result, seen) + beside) + "</p>\n";
+  const std::string beside = context.height ? height_sentence(*context.height) : "";
+  const bool calm = result.verdict == StudyVerdict::nothing_found && beside.empty();
+  std::string page =
+      "<h1>What the simulation gets wrong</h1>\n<p class=\"context\">Map " +
+      report::escaped(context.map.empty() ? "none" : context.map) + ", vehicle " + report::escaped(context.vehicle) +
+      ", model " + report::escaped(context.model) + "; backwash " + report::escaped(context.version) + "</p>\n" +
+      "<p class=\"verdict " + (calm || result.verdict == StudyVerdict::cause_found ? "passed" : "failed") + "\">" +
+      report::escaped((context.rotors ? rotor_sentence(*context.rotors) + " " : "") +
+                      advice(result, seen, context.read_vehicle) + (beside.empty() ? "" : " " + beside)) +
+      "</p>\n<p>" + report::escaped(verdict_sentence(result, seen));
+  if (const auto keys = to_try(result, context.read_vehicle); !keys.empty())
+    page += " Correct this, and study again: the same command with <code>--after " + report::escaped(keys) + "</code>.";
+  page += "</p>\n" + context.first;
+  if (context.consequence) page += consequence_section(*context.consequence);
   for (const auto& cause : result.causes)
     page += report::section(spoken(cause.found.form->cause()), report::escaped(cause.found.form->formula),
                             picture(cause, seen, data) + figures(cause, context));
@@ -269,7 +271,6 @@ std::string study_page(const StudyResult& result, const Observations& seen, cons
   for (std::size_t k = 0; k < result.steady.axes.size(); ++k)
     if (const auto text = steady_words(result.steady, k); !text.empty()) loop += (loop.empty() ? "" : ". ") + text;
   if (!loop.empty()) page += report::section("How the loop answers a steady push", report::escaped(loop + "."), "");
-  if (context.consequence) page += consequence_section(*context.consequence);
   page += unknown_section(result.unknown);
   page += context.residuals;
   page += remaining_section(result.remaining, result.causes.empty());

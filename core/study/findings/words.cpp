@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <tuple>
 
 #include "core/study/findings/extend.hpp"
 #include "core/study/findings/page_sections.hpp"
@@ -15,6 +17,76 @@ Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle) {
   auto remedy = cause.found.form->effect->remedy(fitted_form(cause), vehicle);
   if (cause.flights.empty() || remedy.in == RemedyIn::craft) return remedy;
   return {RemedyIn::craft, {}, "Look for what was different: " + where(cause) + "."};  // no file holds for some flights
+}
+
+namespace {
+
+std::string sure(double nats) {
+  return nats >= kRules.sure_nats ? "surely" : nats >= kRules.probable_nats ? "probably" : "perhaps";
+}
+
+/// The fitted value of a form's first parameter that its words tell as `told`, by Newton's method from `near`.
+double fitted(const Form& form, double told, double near) {
+  const double step = std::sqrt(std::numeric_limits<double>::epsilon());
+  for (int k = 0; k < 6; ++k) {
+    const double here = form.in_words(0, near);
+    near += step * (told - here) / (form.in_words(0, near + step) - here);
+  }
+  return near;
+}
+
+/// Of the first number of a cause's remedy, or of its first parameter.
+std::string interval_of(const NamedCause& cause, const Vehicle& vehicle) {
+  if (cause.found.parameters.empty()) return "";
+  const auto& first = cause.found.parameters.front();
+  double low = first.low, high = first.high;
+  std::string of = " (" + spoken(first.name) + ")";
+  if (const auto set = remedy_of(cause, vehicle).set; !set.empty()) {
+    NamedCause at = cause;
+    const auto end = [&](double told) {
+      at.found.theta[0] = fitted(*cause.found.form, told, cause.found.theta[0]);
+      return remedy_of(at, vehicle).set.front().to;
+    };
+    std::tie(low, high) = std::minmax({end(first.low), end(first.high)});
+    of = "";
+  }
+  return ", " + number(low) + " to " + number(high) + of + " at 95 %";
+}
+
+}  // namespace
+
+std::string advice(const StudyResult& result, const Observations& seen, const Vehicle& vehicle) {
+  switch (result.verdict) {
+    case StudyVerdict::unknown_structure:
+      return "Look for what changes with " + result.unknown.front().along +
+             ": the simulation is wrong along it, and no known cause fits.";
+    case StudyVerdict::insufficient:
+      return "Fly more: " + too_few(seen);
+    case StudyVerdict::nothing_found:
+      return "Nothing to change: nothing was found that the simulation gets wrong.";
+    default:
+      break;
+  }
+  std::string text;
+  for (const auto& cause : result.causes) {
+    std::string names = spoken(cause.found.form->cause());
+    for (const auto& rival : cause.found.rivals) names += " from " + spoken(rival.name);
+    text += text.empty() ? "" : " ";
+    if (!cause.separate_by.empty() && !cause.found.rivals.empty())
+      text += "Fly next: " + cause.separate_by.front().manoeuvre + ". These flights cannot tell " + names + ".";
+    else
+      text += remedy_of(cause, vehicle).words + " That is " + sure(cause.gain.held_out_nats) + " so" +
+              interval_of(cause, vehicle) + ".";
+  }
+  return text;
+}
+
+std::string to_try(const StudyResult& result, const Vehicle& vehicle) {
+  std::string text;
+  for (const auto& cause : result.causes)
+    for (const auto& [key, from, to] : remedy_of(cause, vehicle).set)
+      text += (text.empty() ? "" : " ") + key + "=" + number(to);
+  return text;
 }
 
 Accepted in_words(Accepted cause) {
@@ -85,21 +157,33 @@ std::optional<double> clearance_cost(const Consequence& c) {
   return c.before.flown->min_clearance_m - c.after.flown->min_clearance_m;
 }
 
-std::string cost_sentence(const Consequence& c) {
-  const auto &before = c.before.hover, &after = c.after.hover;
-  std::string text = !before && !after ? "No hover set is bounded, before or after"
-                     : !before         ? "No hover set was bounded before"
-                                       : "No hover set is bounded any more";
+namespace {
+
+std::string cost_of(const FlightOutcome& b, const FlightOutcome& a) {
+  const auto &before = b.hover, &after = a.hover;
+  std::string text = !before && !after ? "no hover set is bounded, before or after"
+                     : !before         ? "no hover set was bounded before"
+                                       : "no hover set is bounded any more";
   if (before && after)
-    text = "Hover sets reach " +
+    text = "hover sets reach " +
            number(100 * (after->extent_95 - before->extent_95 + after->shift_95 - before->shift_95)) +
            " cm farther (95 % of the flown places)";
-  if (const auto cost = clearance_cost(c))
-    return text + "; the plan between two of them has " + number(100 * std::abs(*cost)) +
-           (*cost < 0 ? " cm more clearance." : " cm less clearance.");
-  if (c.before.flown && c.after.plan)
-    return text + "; the plan between two of them is none any more: " + plan::to_string(*c.after.plan) + ".";
+  if (b.flown && a.flown) {
+    const double cost = b.flown->min_clearance_m - a.flown->min_clearance_m;
+    return text + "; the plan between two of them has " + number(100 * std::abs(cost)) +
+           (cost < 0 ? " cm more clearance." : " cm less clearance.");
+  }
+  if (b.flown && a.plan)
+    return text + "; the plan between two of them is none any more: " + plan::to_string(*a.plan) + ".";
   return text + ".";
+}
+
+}  // namespace
+
+std::string cost_sentence(const Consequence& c) { return "With the extended model " + cost_of(c.before, c.after); }
+
+std::string correction_sentence(const Consequence& c) {
+  return c.corrected ? "With the corrected vehicle file " + cost_of(c.before, *c.corrected) : "";
 }
 
 }  // namespace backwash::study

@@ -13,6 +13,13 @@ namespace backwash::study {
 /// What to change for a cause that was found: file, key, value, or what to do with the craft.
 Remedy remedy_of(const NamedCause& cause, const Vehicle& vehicle);
 
+/// What to do, in the first line of all that a study says: each cause's remedy with how sure it is (surely: odds of
+/// 1,000; probably: 20; perhaps) and the 95 % interval of its first number; the flight to fly where causes cannot be
+/// told apart; or that there is nothing to change.
+std::string advice(const StudyResult& result, const Observations& seen, const Vehicle& vehicle);
+/// What `study --after` is told for the remedies that are keys of the vehicle file: "body.mass=1.02"; empty: none is.
+std::string to_try(const StudyResult& result, const Vehicle& vehicle);
+
 /// Parameters and the ends of their intervals as their words say them (Form::meanings): once, and last.
 Accepted in_words(Accepted cause);
 
@@ -42,5 +49,7 @@ std::string beforehand(const Accepted& cause);
 std::optional<double> clearance_cost(const Consequence& consequence);
 /// In a sentence, hover sets too; empty without a consequence of either kind.
 std::string cost_sentence(const Consequence& consequence);
+/// The same of the corrected vehicle file alone; empty where no remedy is a key of it.
+std::string correction_sentence(const Consequence& consequence);
 
 }  // namespace backwash::study

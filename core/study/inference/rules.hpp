@@ -12,6 +12,8 @@ namespace backwash::study {
 /// printed list is the struct itself. What single forms alone have is in the files of the effects.
 struct Rules {
   // Search
+  Rule sure_nats{"sure_nats", 6.9, "nats", "derived: odds of 1,000, told as surely"};
+  Rule probable_nats{"probable_nats", 3, "nats", "derived: odds of 20, told as probably; less, perhaps"};
   Rule flips{"flips", 1200, "draws", "derived: resolves a sixth of a third of accept_p, a further structure's level"};
   Rule accept_p{"accept_p", 0.015, "1",
                 "measured: at 0.03, 40 of 600 worlds without an effect raised alarms, at 0.015 5 of 249 "

@@ -43,6 +43,11 @@ std::size_t place_of(const CampaignFiles& files, const CampaignFiles::Log& log) 
 
 }  // namespace
 
+void append(std::vector<CampaignFiles::Log>& logs, const std::vector<std::string>& given, const CampaignFiles& files) {
+  const auto map = files.maps.empty() ? std::nullopt : std::optional(files.maps.size() - 1);
+  for (const auto& log : given) logs.push_back({log, map});
+}
+
 void add_campaign_options(Command& command, CampaignFiles& files) {
   command
       .add_text(
@@ -51,11 +56,7 @@ void add_campaign_options(Command& command, CampaignFiles& files) {
       .trigger_on_parse();
   command
       .add_texts(
-          "--log",
-          [&files](const std::vector<std::string>& logs) {
-            const auto map = files.maps.empty() ? std::nullopt : std::optional(files.maps.size() - 1);
-            for (const auto& log : logs) files.logs.push_back({log, map});
-          },
+          "--log", [&files](const std::vector<std::string>& logs) { append(files.logs, logs, files); },
           "flight logs, one flight each: CSV, PX4 (.ulg), ArduPilot (.bin) or the daemon's (.mcap)")
       .trigger_on_parse();
 }

@@ -23,6 +23,8 @@ struct CampaignFiles {
   };
   std::vector<Log> logs;
 };
+/// Logs behind the last --map.
+void append(std::vector<CampaignFiles::Log>& logs, const std::vector<std::string>& given, const CampaignFiles& files);
 /// --map and --log, both as often as wanted.
 void add_campaign_options(Command& command, CampaignFiles& files);
 /// each_readable() of the logs, with the place of each among the maps, 0 without one. Throws Failure 64 for a log

@@ -1,20 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <optional>
+#include <sstream>
 
 #include "core/study/findings/extend.hpp"
 #include "core/study/findings/residuals.hpp"
 #include "core/study/findings/study_page.hpp"
+#include "core/study/findings/words.hpp"
 #include "core/study/inference/rotors/rotor_reference.hpp"
 #include "core/study/inference/rotors/sound_rotors.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/learn/calibrate_input.hpp"
+#include "services/backwash/learn/study_before_after.hpp"
 #include "services/backwash/learn/study_design.hpp"
 #include "services/backwash/learn/study_flights.hpp"
 #include "services/backwash/learn/study_output.hpp"
 #include "services/backwash/learn/study_rows.hpp"
 #include "services/backwash/learn/study_simulation.hpp"
-#include "services/backwash/learn/study_terms.hpp"
 #include "services/backwash/verb.hpp"
 #include "version.hpp"
 
@@ -25,26 +27,12 @@ struct StudyOptions {
   CampaignFiles files;
   std::string model = "builtin:quad-5in", vehicle, report, out;
   std::vector<std::string> logs, reference;
+  std::vector<CampaignFiles::Log> before, after;  // after, without before: changed keys of the vehicle file
   std::string group, from;
   unsigned seed = 1;
   DesignOptions design;
   bool json = false, force = false, quick = false, rules = false, residuals = false, rows = false;
 };
-
-/// What the simulation says of the flights with the model's own terms, and with those of the causes beside them.
-std::string residuals(const StudyOptions& options, const Flights& flights, const LookedWith& with, const Model& model,
-                      const study::Observations& measured, const std::vector<SimulationTerm>& found,
-                      report::PageData& data) {
-  FlownAgain again{{}, with.vehicle, model, options.seed};
-  for (const std::size_t k : flights.order())
-    again.flights.push_back({flights.logs[k], flights.paths[k], *with.rooms[flights.rooms[k]].grid});
-  auto terms = read_simulation(options.model);
-  progress("simulating the flights without the causes");
-  const auto before = simulated(again, terms, measured);
-  terms.insert(terms.end(), found.begin(), found.end());
-  progress("simulating the flights with the causes");
-  return study::residual_section(measured, before, simulated(again, terms, measured), data);
-}
 
 /// An autopilot's own log numbers rotors 1 and 2 as facing ones; the verdict is about 1 and 3. Throws Failure.
 void refuse_other_numbers(const std::vector<std::string>& logs) {
@@ -92,14 +80,49 @@ void check_rows(const StudyOptions& options) {
            "--rows", alone);
   not_with(!options.from.empty() && !options.files.logs.empty(), "--from",
            "takes the place of --log: give one of them");
+  not_with(!options.after.empty() && (options.rows || !options.from.empty()), "--after", "needs the logs: give --log");
   not_with(!options.from.empty() && options.residuals, "--residuals", "needs the logs: give --log in place of --from");
+}
+
+bool compares(const StudyOptions& options) { return !options.before.empty(); }
+
+/// --before and --after take the place of --log, and tell one thing alone.
+void check_before_after(const StudyOptions& options) {
+  if (!compares(options)) return;
+  if (options.after.empty()) throw Failure(kUsage, "--before needs --after: the flights after the change");
+  if (!options.logs.empty() || options.rows || options.residuals ||
+      !(options.out + options.from + options.design.points).empty() || !options.reference.empty())
+    throw Failure(kUsage,
+                  "--before and --after go with --vehicle, --map, --model, --group, --report and --json, and in place "
+                  "of --log");
+  for (const auto& log : options.after)
+    if (std::ranges::find(options.before, log.path, &CampaignFiles::Log::path) != options.before.end())
+      throw Failure(kUsage, log.path + " is given before and after the change; give each flight once");
+}
+
+/// KEY=VALUE of --after without --before.
+std::vector<config::ChangedKey> changed_keys(const StudyOptions& options) {
+  std::vector<config::ChangedKey> changed;
+  if (compares(options)) return changed;
+  for (const auto& [text, map] : options.after) {
+    const auto equals = text.find('=');
+    std::istringstream number(equals == std::string::npos ? "" : text.substr(equals + 1));
+    double value = 0;
+    if (!(number >> value) || !(number >> std::ws).eof())
+      throw Failure(kUsage, "--after " + text +
+                                ": needs KEY=VALUE of the vehicle file, as body.mass=1.02; of flights after a change, "
+                                "--before those before it");
+    changed.push_back({text.substr(0, equals), value});
+  }
+  return changed;
 }
 
 void check(const StudyOptions& options) {
   const bool mapless = options.files.maps.empty();
-  if (options.vehicle.empty() || (options.files.logs.empty() && options.from.empty()))
-    throw Failure(kUsage, "study needs --vehicle, and --log or --from");
+  if (options.vehicle.empty() || (options.files.logs.empty() && options.from.empty() && options.before.empty()))
+    throw Failure(kUsage, "study needs --vehicle, and --log, --from or --before and --after");
   check_rows(options);
+  check_before_after(options);
   if (options.residuals && (mapless || options.report.empty()))
     throw Failure(kUsage, "--residuals needs --map, to fly in, and --report, to draw on");
   std::vector<std::string> paths = options.reference;
@@ -131,14 +154,28 @@ void write_model(const StudyOptions& options, const Model& model, const study::S
   write_file(options.out, text, options.force, model_refusal);
 }
 
-std::optional<study::Consequence> what_it_costs(const study::StudyResult& result, const study::Observations& seen,
-                                                const Model& model, const Flights& flights, const LookedWith& with) {
+/// The vehicle file as its remedies say; nothing where none is a key of it, or where it would be no good one.
+std::optional<Vehicle> corrected(const StudyOptions& options, const study::StudyResult& result,
+                                 const Vehicle& vehicle) {
+  auto changed = changed_keys(options);
+  const auto before = changed.size();
+  for (const auto& cause : result.causes)
+    for (const auto& [key, from, to] : study::remedy_of(cause, vehicle).set) changed.push_back({key, to});
+  if (changed.size() == before) return std::nullopt;
+  const auto good = config::load_vehicle_with(options.vehicle, changed);
+  return good ? std::optional(*good) : std::nullopt;
+}
+
+std::optional<study::Consequence> what_it_costs(const StudyOptions& options, const study::StudyResult& result,
+                                                const study::Observations& seen, const Model& model,
+                                                const Flights& flights, const LookedWith& with) {
   if (result.causes.empty()) return std::nullopt;
   progress("hover sets and a plan, before and after");
   std::vector<const map::OccupancyGrid*> grids;
   for (const std::size_t k : flights.order())
     if (const auto& grid = with.rooms[flights.rooms[k]].grid) grids.push_back(&*grid);
-  return study::consequence(result, seen, model, with.vehicle, grids, run_shown);
+  return study::consequence(result, seen, model, with.vehicle, grids, corrected(options, result, with.vehicle),
+                            run_shown);
 }
 
 void print_beside(const Flights& flights, const std::optional<study::Design>& design, const DesignOptions& asked) {
@@ -161,7 +198,8 @@ Flights read_flights(const StudyOptions& options, const LookedWith& with) {
   std::vector<log::FlightLog> logs;
   if (options.from.empty()) {
     each_readable(options.files, with.notes, [&](const auto& path, std::size_t room) {
-      studied.push_back(look_at(path, room, options.group, with, options.residuals ? &logs : nullptr));
+      studied.push_back(
+          look_at(path, room, options.group, with, options.residuals || compares(options) ? &logs : nullptr));
     });
   } else {
     progress("reading " + options.from);
@@ -190,7 +228,8 @@ int run(const StudyOptions& options) {
     return kOk;
   }
   check(options);
-  const auto vehicle = read_vehicle(options.vehicle);
+  const auto changed = changed_keys(options);
+  const auto vehicle = read_vehicle(options.vehicle, changed);
   auto model = read_model(options.model);
   model.ground.r0 = vehicle.body.diagonal_radius;
   std::deque<Room> rooms;
@@ -200,6 +239,14 @@ int run(const StudyOptions& options) {
   const LookedWith with{vehicle, rooms, notes};
   if (options.rows) return print_rows(options, with);
   Flights flights = read_flights(options, with);
+  std::string maps;
+  for (const auto& map : options.files.maps) maps += (maps.empty() ? "" : ", ") + map;
+  if (compares(options))
+    return study_before_after(
+        {options.after, options.report,
+         "Map " + (maps.empty() ? "none" : maps) + ", vehicle " + options.vehicle + ", model " + options.model,
+         options.json, options.force},
+        std::move(flights), with);
   const auto sound = sound_flights(options.reference, with, model, flights);
   auto chosen = study_options(options, sound);
   auto seen = observations(flights, with);
@@ -211,11 +258,12 @@ int run(const StudyOptions& options) {
   Json json = services::to_json(result, seen, vehicle, names);
   add_left_out(json, terms.left, flights);
   if (!options.group.empty()) json["groups"] = {{"by", options.group}, {"count", seen.units.size()}};
+  for (const auto& [key, value] : changed) json["after"].push_back({{"key", key}, {"to", value}});
   const auto height = height_effects(options, flights.paths, model, seen);
   if (height) json["height_effect"] = services::to_json(*height);
   const auto rotors = against_reference(options, sound, seen);
   if (rotors) json["rotors_against_reference"] = services::to_json(*rotors);
-  const auto consequence = what_it_costs(result, seen, model, flights, with);
+  const auto consequence = what_it_costs(options, result, seen, model, flights, with);
   if (consequence) json["consequence"] = services::to_json(*consequence);
   const auto& first = rooms.front().grid;
   const auto design = designed(options.design, seen, result, model, vehicle, first ? &*first : nullptr, options.force);
@@ -226,11 +274,10 @@ int run(const StudyOptions& options) {
   }
   if (!options.report.empty()) {
     std::string beside = design ? html(*design, options.design) : "";
-    std::string maps;
-    for (const auto& map : options.files.maps) maps += (maps.empty() ? "" : ", ") + map;
     report::PageData data;
     if (options.residuals)
-      beside += residuals(options, flights, with, model, measured, study::simulation_of(result, seen), data);
+      beside += residuals({options.model, model, options.seed}, flights, with, measured,
+                          study::simulation_of(result, seen), data);
     write_page(options, result, seen,
                {maps, options.model, options.vehicle, kVersion, consequence, rotors, height, beside, data, vehicle,
                 names, html(notes)});
@@ -249,6 +296,16 @@ Verb study_verb(Command& app) {
   auto& command = app.add_subcommand("study", "What the simulation gets wrong, by name, with the gain");
   command.add_option("logs", options->logs, "such logs, where there is one map or none");
   add_campaign_options(command, options->files);
+  command
+      .add_texts(
+          "--before", [options](const auto& logs) { append(options->before, logs, options->files); },
+          "flights before a change of the vehicle, with --after: did it help?")
+      .trigger_on_parse();
+  command
+      .add_texts(
+          "--after", [options](const auto& given) { append(options->after, given, options->files); },
+          "flights after it; without --before KEY=VALUE as if the vehicle file said so: body.mass=1.02")
+      .trigger_on_parse();
   command.add_option("--model", options->model, "model file or builtin:NAME").capture_default_str();
   command.add_option("--vehicle", options->vehicle, "vehicle file or builtin:NAME");
   command.add_flag("--rows", options->rows,
@@ -280,6 +337,9 @@ Verb study_verb(Command& app) {
             for (const auto& log : options->logs)
               options->files.logs.push_back(
                   {log, options->files.maps.size() == 1 ? std::optional<std::size_t>(0) : std::nullopt});
+            if (compares(*options))
+              for (const auto* side : {&options->before, &options->after})
+                options->files.logs.insert(options->files.logs.end(), side->begin(), side->end());
             return run(*options);
           }};
 }

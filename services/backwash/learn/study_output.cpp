@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/study/before_after/before_after_rules.hpp"
 #include "core/study/calibrate/calibration_rules.hpp"
 #include "core/study/design/design_rules.hpp"
 #include "core/study/findings/page_sections.hpp"
@@ -120,6 +121,8 @@ Json to_json(const study::FlightOutcome& o) {
 Json to_json(const study::StudyResult& result, const study::Observations& seen, const Vehicle& vehicle,
              const std::vector<std::string>& logs) {
   Json json = {{"verdict", study::to_string(result.verdict)},
+               {"advice", study::advice(result, seen, vehicle)},
+               {"try_after", study::to_try(result, vehicle)},
                {"flights", seen.flights},
                {"windows", seen.windows.size()},
                {"gated_out", Json::object()},
@@ -165,6 +168,7 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
 
 Json to_json(const study::Consequence& c) {
   Json json = {{"places", c.places}, {"before", to_json(c.before)}, {"after", to_json(c.after)}};
+  if (c.corrected) json["corrected"] = to_json(*c.corrected);
   if (const auto cost = study::clearance_cost(c)) json["clearance_cost_m"] = *cost;
   if (c.before.plan) json.update({{"start", to_json(c.start_W)}, {"goal", to_json(c.goal_W)}});
   return json;
@@ -236,6 +240,7 @@ std::vector<study::Rule> all_rules() {
   auto all = study::rules();
   study::append_rules(all, study::calibrate::kCalibrationRules);
   study::append_rules(all, study::kDesignRules);
+  study::append_rules(all, study::kBeforeAfterRules);
   return all;
 }
 
@@ -245,11 +250,14 @@ void print_text(const study::StudyResult& result, const study::Observations& see
                 const std::vector<std::string>& logs, const std::optional<study::Consequence>& consequence,
                 const std::optional<study::RotorVerdict>& rotors,
                 const std::optional<study::calibrate::HeightEffects>& height) {
+  std::printf("%s\n", study::advice(result, seen, vehicle).c_str());
+  if (const auto keys = study::to_try(result, vehicle); !keys.empty())
+    std::printf("correct this, and study again: --after %s\n", keys.c_str());
   std::printf("%s: %zu flights, %zu windows\n", study::to_string(result.verdict), seen.flights, seen.windows.size());
-  if (result.verdict == study::StudyVerdict::insufficient) std::printf("%s\n", study::too_few(seen).c_str());
   for (const auto& cause : result.causes) print_text(cause, vehicle, logs);
   for (std::size_t k = 0; k < result.steady.axes.size(); ++k)
     if (const auto text = study::steady_words(result.steady, k); !text.empty()) std::printf("%s\n", text.c_str());
+  if (consequence && consequence->corrected) std::printf("%s\n", study::correction_sentence(*consequence).c_str());
   if (consequence) std::printf("%s\n", study::cost_sentence(*consequence).c_str());
   for (const auto& r : result.refused) std::printf("refused: %s\n", study::refusal(r).c_str());
   for (const auto& u : result.unknown)

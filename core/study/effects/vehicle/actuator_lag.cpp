@@ -3,6 +3,7 @@
 
 #include "core/study/effects/columns.hpp"
 #include "core/study/effects/on_the_model.hpp"
+#include "core/types/formatted.hpp"
 
 namespace backwash::study {
 namespace {
@@ -47,7 +48,9 @@ Remedy of_either(const FittedForm& fitted, const Vehicle& v) {
         "Look for heavier propellers or slower speed controllers than the simulation has; the model of --out has the "
         "lag.");
   const double now = v.controller.attitude_lag;
-  return in_vehicle({{"controller.attitude_lag", now, std::max(0.0, now + fitted.theta[0])}});
+  const double lags = std::max(0.0, now + fitted.theta[0]);
+  return in_vehicle({{"controller.attitude_lag", now, lags}},
+                    formatted("The attitude lags %.3g s, not %.3g", lags, now));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/effects/columns.hpp"
 #include "core/study/effects/on_the_model.hpp"
+#include "core/types/formatted.hpp"
 
 namespace backwash::study {
 
@@ -19,7 +20,9 @@ Effect command_latency() {
           .remedy =
               [](auto& fitted, auto& v) {
                 const double now = v.controller.latency;
-                return in_vehicle({{"controller.latency", now, now + fitted.theta[0]}});
+                const double acts = now + fitted.theta[0];
+                return in_vehicle({{"controller.latency", now, acts}},
+                                  formatted("Set-points act %.3g s late, not %.3g", acts, now));
               },
           .manoeuvres = {{"sideways steps of the set-point, hard", [](WindowRow& w, double) {
                             w.command_gain = w.lag_gain = {60, -10};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/study/effects/columns.hpp"
 #include "core/study/effects/on_the_model.hpp"
+#include "core/types/formatted.hpp"
 
 namespace backwash::study {
 namespace {
@@ -71,7 +72,9 @@ Effect payload() {
       .remedy = [](auto& fitted, auto& v) {
         if (fitted.form.needs.front() == Source::motors)
           return with_craft("Move the weight, or the battery, towards the middle of the craft.");
-        return in_vehicle({{"body.mass", v.body.mass, v.body.mass / (1 - fitted.theta[0])}});
+        const double weighs = v.body.mass / (1 - fitted.theta[0]);
+        return in_vehicle({{"body.mass", v.body.mass, weighs}},
+                          formatted("Your vehicle weighs %.3g kg, not %.3g", weighs, v.body.mass));
       }};
 }
 

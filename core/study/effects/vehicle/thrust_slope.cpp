@@ -3,6 +3,7 @@
 
 #include "core/study/effects/columns.hpp"
 #include "core/study/effects/on_the_model.hpp"
+#include "core/types/formatted.hpp"
 #include "core/types/thrust.hpp"
 
 namespace backwash::study {
@@ -15,8 +16,10 @@ Remedy steeper(const FittedForm& fitted, const Vehicle& v) {
   const double u = thrust_command(v, share);
   const double per_thrust = (1 + fitted.theta[0]) * (2 * f * u + 1 - f) / share;  // slope over thrust at u
   const double wanted = std::clamp((per_thrust * u - 1) / (2 * u - 1 - per_thrust * (u * u - u)), 0.0, 1.0);
-  return in_vehicle({{"propulsion.thr_mdl_fac", f, wanted},
-                     {"propulsion.max_thrust", v.propulsion.max_thrust, weight / (wanted * u * u + (1 - wanted) * u)}});
+  return in_vehicle(
+      {{"propulsion.thr_mdl_fac", f, wanted},
+       {"propulsion.max_thrust", v.propulsion.max_thrust, weight / (wanted * u * u + (1 - wanted) * u)}},
+      formatted("Thrust rises %.3g times as steeply with its command as the file says", 1 + fitted.theta[0]));
 }
 
 }  // namespace

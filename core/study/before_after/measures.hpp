@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/log/columns/flight_log.hpp"
+#include "core/study/windows/observation.hpp"
+#include "core/types/vehicle.hpp"
+
+/// What a change of tune, propeller, estimator or guard may have moved, by flight (docs/model.md 8-14).
+namespace backwash::study {
+
+/// Distance to the nearest surface and speed of a window, as octaves: what is flown in one cell is compared.
+using Cell = std::pair<int, int>;
+
+/// One number of a flight: of a window, or of the whole flight in the cell (0, 0).
+struct MeasuredValue {
+  std::size_t flight;
+  Cell cell;
+  double y;
+};
+
+/// A quantity of which less is better.
+struct FlightMeasure {
+  std::string name, unit;  ///< unit: of exp(y) where `ratio`, else of y
+  bool ratio;              ///< y is the logarithm of the quantity: differences are ratios
+  std::vector<MeasuredValue> values;
+};
+
+struct FlightMeasures {
+  std::vector<FlightMeasure> tested;
+  std::vector<std::pair<std::string, std::string>> not_tested;  ///< name, why
+};
+
+/// Variance of acceleration by distance to the nearest surface, tracking error, delays of the commands, vibration by
+/// octave, hover command and battery of each flight. `logs`: those of `seen`, in its order. Vibration is tested where
+/// the logs' rates agree within a tenth: else what is faster than half of them folds back differently. O(rows).
+FlightMeasures measures_of(const Observations& seen, const std::vector<const log::FlightLog*>& logs,
+                           const Vehicle& vehicle);
+
+}  // namespace backwash::study
