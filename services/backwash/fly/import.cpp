@@ -16,9 +16,7 @@
 namespace backwash::services {
 namespace {
 
-/// Reads a recording; what was left out of it, a sentence each, goes to `notes`.
-using Importer = std::function<tl::expected<log::FlightLog, log::LogError>(const std::string& path,
-                                                                           std::vector<std::string>& notes)>;
+using Importer = std::function<tl::expected<log::FlightLog, log::LogError>(const std::string& path)>;
 
 struct ImportOptions {
   std::string kind, folder, map_columns, columns, labels;
@@ -48,13 +46,13 @@ std::pair<Importer, std::vector<std::string>> importer_of(const ImportOptions& o
     if (kind && options.files.empty())
       throw Failure(kUsage, "no recording given after the kind '" + options.kind + "'");
     const auto read = kind ? kind->read : log::read_recording;
-    return {[read](const std::string& path, auto&) { return read(path); }, kind ? options.files : files};
+    return {read, kind ? options.files : files};
   }
   const auto map = read_column_map(options.map_columns);
   if (!map)
     throw Failure(map.error().kind == config::ConfigError::Kind::not_found ? kNoInput : kConfiguration,
                   map.error().message);
-  return {[map = *map](const std::string& path, auto& notes) { return log::import_columns(path, map, &notes); }, files};
+  return {[map = *map](const std::string& path) { return log::import_columns(path, map); }, files};
 }
 
 [[noreturn]] void fail(const log::LogError& error) {
@@ -109,7 +107,7 @@ int run(const ImportOptions& options) {
   log::KnownFlights known;
   std::vector<std::string> notes;
   for (const auto& file : files) {
-    auto log = read(file, notes);
+    auto log = read(file);
     if (!log) {
       // A recording without rows is not the end of a hundred others; alone it is an error.
       if (files.size() == 1 || log.error().kind == log::LogError::Kind::not_found) fail(log.error());
