@@ -206,12 +206,15 @@ std::vector<AxesReading> axes_readings(const FlightLog& log) {
   if (!has_all(log, kAttitude) || log.t_s.empty()) return {};
   const Thrust thrust(log);
   const bool force = has_xyz(log, "specific_force_", "");
-  std::vector<AxesReading> moved, all;
+  const auto same = [](const UpAxes& a, const UpAxes& b) { return a.world == b.world && a.body == b.body; };
+  std::vector<AxesReading> moved, weighed, all;
   for (const Reading& reading : kReadings) {
     const auto up = thrust.up(reading), felt = force ? by_force(log, reading) : up;
-    if (up && felt && up->world == felt->world && up->body == felt->body) moved.push_back({*up, keys_of(reading)});
+    if (felt && std::ranges::none_of(weighed, [&](const auto& r) { return same(r.up, *felt); }))
+      weighed.push_back({*felt, keys_of(reading)});
+    if (up && felt && same(*up, *felt)) moved.push_back({*up, keys_of(reading)});
   }
-  if (const auto felt = force && moved.empty() ? by_force(log) : std::nullopt) return {{*felt, ""}};
+  if (moved.empty()) moved = weighed;  // by the weight alone
   const auto highest = [&](const AxesReading& reading) {
     double most = -std::numeric_limits<double>::infinity();
     for (std::size_t row = 0; row < log.t_s.size(); ++row)
