@@ -255,8 +255,9 @@ tl::expected<ForeignTable, LogError> read_foreign_table(const std::string& path)
   std::string_view text = *content;
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // spreadsheets write it
   std::vector<std::string_view> lines;
+  const char line_end = text.find('\n') == text.npos ? '\r' : '\n';
   while (!text.empty()) {
-    const auto end = std::min(text.find('\n'), text.size());
+    const auto end = std::min(text.find(line_end), text.size());
     lines.push_back(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
   }

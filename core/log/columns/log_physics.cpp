@@ -148,6 +148,19 @@ Doubts of_gravity(const FlightLog& log) {
            true}};
 }
 
+/// Axes that are up, and are not z (3-11).
+Doubts of_axes(const FlightLog& log) {
+  const auto readings = axes_readings(log);
+  if (readings.empty() || !readings.front().keys.empty()) return {};
+  const auto& up = readings.front().up;
+  if (up.world == Vec3::UnitZ() && up.body == Vec3::UnitZ()) return {};
+  return {{list(kP),
+           "the weight and the thrust are along other axes than z: import it with frame.world = \"" +
+               called(upright_world(up.world), named_worlds()) + "\" and frame.body = \"" +
+               called(upright_body(up.body), named_bodies()) + "\"",
+           true}};
+}
+
 Doubts of_tilt(const FlightLog& log) {
   return doubts_of({{"tilt along x (pitch)", "tilt along y (roll)"},
                     {kP[0], kP[1]},
@@ -262,6 +275,7 @@ Doubts contradictions(const FlightLog& log) {
     add(doubts, silent(log, names) ? of_zeros(log, motion, names, second) : of_motion(log, motion, names, second));
   }
   add(doubts, of_extent(motion));
+  add(doubts, of_axes(log));
   if (has_all(log, kA)) add(doubts, of_gravity(log));
   if (has_all(log, kQ)) add(doubts, of_attitude(log));
   add(doubts, of_commands(log));

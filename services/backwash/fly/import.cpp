@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <set>
 #include <utility>
 
 #include "core/log/autopilot/same_flight.hpp"
@@ -93,17 +94,23 @@ void add_labels(log::FlightLog& log, const log::Labels& labels, const std::strin
 int run(const ImportOptions& options) {
   if (options.propose) return propose(options);
   if (!options.columns.empty()) throw Failure(kUsage, "--columns names a table's columns for --propose");
-  const auto [read, files] = importer_of(options);
+  auto [read, files] = importer_of(options);
   if (options.folder.empty()) throw Failure(kUsage, "--out is required: the folder for the flight logs");
   std::error_code error;
   std::filesystem::create_directories(options.folder, error);
   if (!std::filesystem::is_directory(options.folder))
     throw Failure(kCannotCreate, options.folder + ":1: cannot be created; name a folder that can be written");
-  std::vector<std::string> targets;
+  std::vector<std::string> twice, targets;
+  std::set<std::filesystem::path> once;
+  std::erase_if(files, [&](const std::string& file) {
+    const bool again = !once.insert(std::filesystem::weakly_canonical(file, error)).second;
+    if (again) twice.push_back(file + ":1: is given twice; read once");
+    return again;
+  });
   for (const auto& file : files) targets.push_back(target(options.folder, file));
   check_outputs(targets, options.force);
   const auto labels = labels_of(options);
-  Json logs = Json::array(), refused = Json::array();
+  Json logs = Json::array(), refused = twice;
   log::KnownFlights known;
   std::vector<std::string> notes;
   for (const auto& file : files) {
@@ -126,7 +133,7 @@ int run(const ImportOptions& options) {
   if (logs.empty()) throw Failure(kBadData, refused.front().get<std::string>());
   if (options.json) {
     print(Json{{"kind", !options.map_columns.empty() ? "columns"
-                        : files == options.files     ? options.kind
+                        : kind_of(options)           ? options.kind
                                                      : "by content"},
                {"logs", logs},
                {"refused", refused},

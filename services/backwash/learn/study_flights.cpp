@@ -14,6 +14,7 @@
 #include "core/study/windows/observer.hpp"
 #include "core/study/windows/signals/same_gusts.hpp"
 #include "services/backwash/files.hpp"
+#include "services/backwash/plan/logged_vehicle.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
@@ -93,6 +94,7 @@ StudiedFlight look_at(const std::string& path, std::size_t room, const std::stri
                       std::vector<log::FlightLog>* keep) {
   progress("reading " + path);
   auto log = read_studied(path, with.notes);
+  if (const auto other = another_vehicle(log, with.vehicle); !other.empty()) with.notes.column(path, other);
   if (!group.empty() && (!log.has(group) || log.column(group).empty()))
     throw Failure(kBadData, path + ":1: no column '" + group + "' to group flights by; name one that it has");
   Room& in = with.rooms[room];
