@@ -369,6 +369,48 @@ TEST_F(ImportColumns, AnAttitudeReadWronglyIsToldByTheFlight) {
   EXPECT_NE(flown("t,x,y,z,qw,qx,qy,qz", false), "");
 }
 
+TEST_F(ImportColumns, OfNoTurnAFlightIsWrittenWhoseAxesContradictIt) {
+  int right = 0, asked = 0;
+  for (const char* world : {"x, y, z", "y, x, -z", "x, -z, y", "z, x, y", "-y, -z, x", "y, z, x"})
+    for (const char* body : {"x, y, z", "x, -y, -z", "x, -z, y", "z, -y, x"})
+      for (const bool inverse : {false, true})
+        for (const double moved : {0.0, 1.0})
+          for (const bool force : {false, true}) {
+            const Mat3 of_world = turn_of(world)->transpose(), of_body = *turn_of(body);
+            table(force ? "t,x,y,z,qw,qx,qy,qz,fx,fy,fz" : "t,x,y,z,qw,qx,qy,qz", [&](double t) {
+              Truth s = truth(t);
+              if (moved == 0)
+                s = {0.01 * s.p, 0.01 * s.v, 0.01 * s.a, Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Vec3::UnitZ()))};
+              const Vec3 p = of_world * (s.p + Vec3(0.6, 0.8, 1.2));
+              Eigen::Quaterniond q(Mat3(of_world * s.q.toRotationMatrix() * of_body));
+              const Vec3 f =
+                  of_body.transpose() * (s.q.conjugate() * Vec3(s.a + Vec3(0.05 * std::sin(777 * t), 0, kGravity)));
+              if (inverse) q = q.conjugate();
+              std::string cells = line({t, p.x(), p.y(), p.z()}) + line({0, q.w(), q.x(), q.y(), q.z()}).substr(1);
+              return force ? cells + line({0, f.x(), f.y(), f.z()}).substr(1) : cells;
+            });
+            ColumnMap map;
+            map.columns = {{"t_s", {"t", ""}}, {"x_m", {"x", ""}}, {"y_m", {"y", ""}}, {"z_m", {"z", ""}}};
+            for (const char* name : {"qw", "qx", "qy", "qz"}) map.columns[name] = {name, ""};
+            for (const char* axis : {"x", "y", "z"})
+              if (force) map.columns[std::string("specific_force_") + axis] = {std::string("f") + axis, ""};
+            const auto log = import_columns(path_, map);
+            const std::string which = std::string(world) + "; " + body + "; " + std::to_string(inverse) +
+                                      std::to_string(moved) + std::to_string(force);
+            if (!log) {
+              EXPECT_NE(log.error().message.find("frame."), std::string::npos) << which << log.error().message;
+              ++asked;
+              continue;
+            }
+            ++right;
+            for (std::size_t k = 0; k < log->t_s.size(); k += 97)
+              EXPECT_NEAR(log->column("z_m")[k], (moved == 0 ? 0.01 : 1) * truth(log->t_s[k]).p.z() + 1.2, 1e-4)
+                  << which;
+          }
+  EXPECT_GE(right, 3);
+  EXPECT_GE(asked, 150);
+}
+
 TEST_F(ImportColumns, WhatNeitherTheFlightNorTheMapTellsIsAsked) {
   table("t,x,y,z,qw,qx,qy,qz", [](double t) {
     const Vec3 p = 0.002 * truth(t).p;
