@@ -50,6 +50,9 @@ std::string wrong_axes(const FlightLog& theirs, const ColumnMap& map);
 /// Such a log in our axes with velocity and acceleration, whatever physics says of it. Error: why it cannot be made.
 tl::expected<FlightLog, std::string> in_our_axes(FlightLog log, const ColumnMap& map);
 
+/// Which axes are up of a flight log whose own are not (3-11), and what turns it; empty: z is, or it does not tell.
+std::string turned_axes(const FlightLog& log);
+
 /// What in a log cannot be: velocity is not the derivative of position, acceleration not that of velocity, gravity is
 /// still in it, the attitude does not tilt where the craft accelerates or is none, thrust is no share of 1, columns are
 /// 0 in every row while the craft moves. Axes are judged by doubts_of(): what the flight did not move says nothing.

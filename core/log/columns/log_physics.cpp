@@ -148,17 +148,9 @@ Doubts of_gravity(const FlightLog& log) {
            true}};
 }
 
-/// Axes that are up, and are not z (3-11).
 Doubts of_axes(const FlightLog& log) {
-  const auto readings = axes_readings(log);
-  if (readings.empty() || !readings.front().keys.empty()) return {};
-  const auto& up = readings.front().up;
-  if (up.world == Vec3::UnitZ() && up.body == Vec3::UnitZ()) return {};
-  return {{list(kP),
-           "the weight and the thrust are along other axes than z: import it with frame.world = \"" +
-               called(upright_world(up.world), named_worlds()) + "\" and frame.body = \"" +
-               called(upright_body(up.body), named_bodies()) + "\"",
-           true}};
+  const auto words = turned_axes(log);
+  return words.empty() ? Doubts{} : Doubts{{list(kP), words, true}};
 }
 
 Doubts of_tilt(const FlightLog& log) {
@@ -265,6 +257,17 @@ Doubts of_attitude(const FlightLog& log) {
 }
 
 }  // namespace
+
+std::string turned_axes(const FlightLog& log) {
+  if (!has_all(log, kP)) return "";
+  const auto readings = axes_readings(log);
+  if (readings.empty() || !readings.front().keys.empty()) return "";
+  const auto& up = readings.front().up;
+  if (up.world == Vec3::UnitZ() && up.body == Vec3::UnitZ()) return "";
+  return "the weight and the thrust are along other axes than z: import it with frame.world = \"" +
+         called(upright_world(up.world), named_worlds()) + "\" and frame.body = \"" +
+         called(upright_body(up.body), named_bodies()) + "\"";
+}
 
 Doubts contradictions(const FlightLog& log) {
   Doubts doubts;

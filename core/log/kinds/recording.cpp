@@ -12,6 +12,7 @@
 #include "core/log/autopilot/dataflash.hpp"
 #include "core/log/autopilot/ulog.hpp"
 #include "core/log/columns/import_airgarage.hpp"
+#include "core/log/columns/import_columns.hpp"
 #include "core/log/columns/import_crazypad.hpp"
 #include "core/log/raw/raw_flight.hpp"
 
@@ -24,7 +25,13 @@ using std::string_view_literals::operator""sv;
 tl::expected<FlightLog, LogError> read_raw_flight(const std::string& path) {
   return read_raw_log(path).and_then([&](const RawLog& log) { return flight_of_raw_log(log, path); });
 }
-tl::expected<FlightLog, LogError> read_own(const std::string& path) { return read_csv(path); }
+tl::expected<FlightLog, LogError> read_own(const std::string& path) {
+  auto log = read_csv(path);
+  if (!log || log->t_s.size() < 2) return log;
+  if (const auto turned = turned_axes(*log); !turned.empty())
+    return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + turned});
+  return log;
+}
 
 constexpr std::array kRead{RecordingKind{"airgarage", Form::table, "a table of airgarage", import_airgarage},
                            RecordingKind{"ardupilot", Form::autopilot, "a DataFlash log of ArduPilot", read_dataflash},

@@ -56,6 +56,8 @@ log::FlightLog read_flight(const std::string& path) {
 log::FlightLog read_told(const std::string& path, LogNotes& notes) {
   auto log = read_flight(path);
   for (const auto& what : log.notes) notes.column(path, what);
+  if (is_autopilots_log(path) || log.t_s.size() < 2) return log;
+  if (const auto turned = log::turned_axes(log); !turned.empty()) throw Failure(kBadData, path + ":1: " + turned);
   return log;
 }
 
