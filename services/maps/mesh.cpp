@@ -100,6 +100,11 @@ std::size_t faces_of(std::size_t corners, int mode) {
   return corners - std::min(corners, before);
 }
 
+bool is_stl_text(std::string_view content) {
+  return content.size() > 5 && std::ranges::equal(content.substr(0, 5), std::string_view("solid"),
+                                                  [](unsigned char a, char b) { return std::tolower(a) == b; });
+}
+
 /// The facets of an STL: by its head, which its size must bear out, or by its words.
 tl::expected<std::size_t, std::string> facets_of(std::string_view content) {
   constexpr std::size_t kHead = 84, kFacet = 50, kShown = 80;  // bytes: before the facets, of each, before their count
@@ -107,7 +112,7 @@ tl::expected<std::size_t, std::string> facets_of(std::string_view content) {
   if (content.size() >= kHead) std::memcpy(&said, content.data() + kShown, sizeof said);
   if (content.size() == kHead + kFacet * said) return said;
   std::size_t opened = 0, closed = 0, corners = 0;
-  for (auto rest = content; content.starts_with("solid") && !rest.empty();) {
+  for (auto rest = content; is_stl_text(content) && !rest.empty();) {
     auto line = take_line(rest);
     const auto word = take_word(line);
     const auto is = [&](std::string_view other) {
@@ -130,7 +135,12 @@ tl::expected<std::size_t, std::string> faces_shown(std::string_view content) try
   constexpr std::size_t kHead = 20, kMostNodes = 1 << 20;  // of a binary file: its own head and that of its JSON
   if (content.starts_with("glTF")) {
     std::uint32_t length = 0;
+    std::uint32_t all = 0;
     if (content.size() >= kHead) std::memcpy(&length, content.data() + 12, sizeof length);
+    if (content.size() >= kHead) std::memcpy(&all, content.data() + 8, sizeof all);
+    if (all != content.size())
+      return tl::make_unexpected("has " + std::to_string(content.size()) + " bytes, and its head says " +
+                                 std::to_string(all));
     if (length == 0 || content.size() - kHead < length) return tl::make_unexpected("is cut short");
     content = content.substr(kHead, length);
   }
@@ -163,6 +173,12 @@ Read read_mesh(const std::string& path, std::string_view content, bool gltf) {
   const auto stated = gltf ? faces_shown(content) : facets_of(content);
   if (!stated) return corrupt(path, ": " + stated.error() + "; export it again");
   const std::size_t bytes = content.size();
+  std::string lower;  // assimp knows an STL's words so alone
+  if (!gltf && is_stl_text(content)) {
+    lower.resize(bytes);
+    std::ranges::transform(content, lower.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (const auto words = facets_of(lower); lower.find('\0') == lower.npos && words) content = lower;
+  }
   // A slow text format takes a second for 1 MiB.
   const std::size_t seconds = 20 + (bytes >> 20), most_bytes = (std::size_t{2} << 30) + 40 * bytes;
   const auto said = in_child([&](const Sink& sink) { import(path, content, gltf, sink); }, seconds, most_bytes);

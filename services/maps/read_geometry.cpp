@@ -146,6 +146,8 @@ Read read_geometry(const std::string& path, const std::string& topic, double bod
   const bool zipped = content->starts_with("\x1f\x8b");
   auto whole = files::unzipped(std::move(*content), files::kLargestTable);
   if (!whole) return corrupt(path, ": " + whole.error());
+  const auto has = [&](char c) { return whole->find(c) != whole->npos; };
+  if (has('\r') && !has('\n') && !has('\0')) std::ranges::replace(*whole, '\r', '\n');  // lines of old programs
   auto ending = ending_of(path);
   if (zipped && ending == ".gz") ending = ending_of(std::filesystem::path(path).stem().string());
   const auto begins = [&](const auto& kind) { return *kind.begins && whole->starts_with(kind.begins); };

@@ -197,10 +197,12 @@ Read read_recording(const std::string& path, std::string_view content, const std
     return why.empty() ? why : channel.topic + ": " + why;
   };
   listener.unpack = unpacked;
+  listener.over_damage = true;
   const auto end = log::walk_mcap(content, listener);
   const auto at = "byte " + std::to_string(end.at) + ": ";
   if (!end.wrong.empty()) return corrupt(path, ": " + at + end.wrong);
   auto geometry = recording.placed(path);
+  if (const auto loss = end.loss(content.size()); geometry && !loss.empty()) geometry->notes.push_back(loss);
   if (geometry && !end.whole) geometry->notes.push_back("it was cut short at " + at + "what is before is used");
   return geometry;
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 #include "core/log/columns/import_columns.hpp"
 #include "core/types/geometry.hpp"
@@ -187,6 +188,26 @@ TEST(Impossible, AnAttitudeInAnotherOrderIsToldWithTheOrderThatFits) {
   };
   EXPECT_NE(refusal(rotated(3)).find("x, y, z, w"), std::string::npos) << refusal(rotated(3));
   EXPECT_NE(refusal(rotated(1)).find("z, w, x, y"), std::string::npos) << refusal(rotated(1));
+}
+
+TEST(Impossible, AWorldWhoseYIsUpIsRefusedWithTheKeyThatTurnsIt) {
+  const auto words = refusal([](FlightLog& log) {
+    for (const auto& [prefix, unit] : {std::pair{"", "_m"}, {"v", "_mps"}, {"a", "_mps2"}}) {
+      auto &y = log.columns.at(std::string(prefix) + "y" + unit), &z = log.columns.at(std::string(prefix) + "z" + unit);
+      std::swap(y, z);
+      for (double& v : z) v = -v;
+    }
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(-std::numbers::pi / 2, Vec3::UnitX()));
+    for (std::size_t k = 0; k < log.t_s.size(); ++k) {
+      const Eigen::Quaterniond q =
+          turn * Eigen::Quaterniond(log.column("qw")[k], log.column("qx")[k], log.column("qy")[k], log.column("qz")[k]);
+      log.columns["qw"][k] = q.w();
+      log.columns["qx"][k] = q.x();
+      log.columns["qy"][k] = q.y();
+      log.columns["qz"][k] = q.z();
+    }
+  });
+  EXPECT_NE(words.find("frame.world = \"x, -z, y\""), std::string::npos) << words;
 }
 
 TEST(SilentColumns, AreThoseOfASensorThatReadsNothingInAnyRow) {

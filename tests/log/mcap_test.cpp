@@ -8,9 +8,11 @@
 #include <cstring>
 #include <fstream>
 #include <random>
+#include <set>
 #include <sstream>
 
 #include "core/log/mcap/mcap_flight.hpp"
+#include "core/log/mcap/mcap_walk.hpp"
 #include "core/log/mcap/mcap_writer.hpp"
 #include "core/log/mcap/ros_schemas.hpp"
 #include "core/log/raw/raw_flight.hpp"
@@ -234,6 +236,70 @@ TEST_F(McapFile, ThatSomebodyCompressedIsRefusedByName) {
   const auto log = read(content);
   ASSERT_FALSE(log);
   EXPECT_NE(log.error().message.find("is compressed"), std::string::npos) << log.error().message;
+}
+
+/// A recording without chunks and checksums, as some recorders write it: `count` messages of 40 bytes that count up.
+std::string without_chunks(int count) {
+  std::string file(kMcapMagic.begin(), kMcapMagic.end());
+  const auto number = [](auto value) { return std::string(reinterpret_cast<const char*>(&value), sizeof value); };
+  const auto text = [&](const std::string& s) { return number(static_cast<std::uint32_t>(s.size())) + s; };
+  const auto put = [&](char op, const std::string& body) { file += op + number(std::uint64_t{body.size()}) + body; };
+  put(1, text("ros2") + text("a test"));
+  put(3, number(std::uint16_t{1}) + text("a/b") + text("") + text(""));
+  put(4, number(std::uint16_t{1}) + number(std::uint16_t{1}) + text("/a") + text("cdr") + text(""));
+  for (std::uint64_t k = 0; k < static_cast<std::uint64_t>(count); ++k) {
+    std::string body = number(std::uint16_t{1}) + number(std::uint32_t{0}) + number(k) + number(k);
+    for (int i = 0; i < 5; ++i) body += number(0x0101010101010101 * (k + 1));
+    put(5, body);
+  }
+  put(15, number(std::uint32_t{0}));
+  put(11, number(static_cast<std::uint64_t>(count)) + std::string(38, '\0'));
+  put(2, std::string(20, '\0'));
+  return file + std::string(kMcapMagic.begin(), kMcapMagic.end());
+}
+
+/// What of a file is read over its damage: the messages, and what is told.
+std::pair<std::vector<std::string>, McapEnd> over_damage(const std::string& file) {
+  std::vector<std::string> messages;
+  McapListener listener;
+  listener.message = [&](const McapChannel&, std::string_view data, std::uint64_t) {
+    messages.emplace_back(data);
+    return std::string();
+  };
+  listener.over_damage = true;
+  auto end = walk_mcap(file, listener);
+  return {messages, end};
+}
+
+TEST_F(McapFile, DamagedAnywhereGivesWhatIsLeftAndTellsTheShareLost) {
+  std::mt19937 random(53);
+  for (const auto& [name, whole, least] : {std::tuple{"chunks", whole_, 0.2}, {"none", without_chunks(3000), 0.9}}) {
+    const auto sound = over_damage(whole);
+    ASSERT_EQ(sound.second.wrong, "");
+    EXPECT_EQ(sound.second.loss(whole.size()), "");
+    const std::set<std::string> written(sound.first.begin(), sound.first.end());
+    for (int n = 0; n < 100; ++n) {
+      std::string hurt = whole;
+      const std::size_t at = 2000 + random() % (whole.size() - 6000), size = 1 + random() % 3000;
+      // Other bytes in a message without a checksum nobody can tell.
+      const int way = name == std::string("none") ? 0 : n % 4;
+      if (way == 0) hurt.erase(at, size);
+      if (way == 1) hurt.replace(at, size, size, '\0');
+      if (way == 2) hurt.insert(at, std::string(size, 'x'));
+      if (way == 3) hurt.resize(at);
+      const auto [messages, end] = over_damage(hurt);
+      EXPECT_EQ(end.wrong, "") << name << n;
+      std::size_t others = 0;
+      for (const auto& message : messages) others += written.contains(message) ? 0 : 1;
+      EXPECT_EQ(others, 0u) << name << n;
+      if (messages.size() < sound.first.size()) {
+        EXPECT_TRUE(!end.loss(hurt.size()).empty() || !end.whole) << name << n << ": silent";
+      }
+      if (way < 3) {
+        EXPECT_GE(static_cast<double>(messages.size()), least * static_cast<double>(sound.first.size())) << name << n;
+      }
+    }
+  }
 }
 
 TEST_F(McapFile, MessagesHaveWallTimeAndTheirLogTimeNeverFalls) {

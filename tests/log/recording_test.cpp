@@ -134,6 +134,10 @@ TEST_F(Recording, IsNamedByItsContent) {
       {"\xfd"
        "7zXZ\0....."s,
        "xz -dk"},
+      {"ply\nformat ascii 1.0\n", "map convert"},
+      {"# of a modeller\rv 0 0 0\rv 1 0 0\r", "map convert"},
+      {"SOLID room\nFACET", "map convert"},
+      {"{\"asset\": {}}", "map convert"},
       {"time,px,py,pz\n0,1,2,3\n", "import --propose"}};
   for (const auto& [content, way] : unread) {
     const auto path = file("flight.ulg", content);

@@ -144,6 +144,7 @@ TEST(Validity, OfArduPilotsConstantPositionModeNothingIsTaken) {
     const auto low = flight_of(px4_names(ardupilot(ekf, 0x1f)));  // no height
     ASSERT_TRUE(low) << low.error();
     EXPECT_TRUE(says(low->notes, "height is not valid in 50 %"));
+    EXPECT_FALSE(says(low->notes, "ArduPilot"));
   }
 }
 

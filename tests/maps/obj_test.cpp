@@ -25,6 +25,7 @@ TEST_F(Obj, HasEveryFaceHoweverItIsWritten) {
       {"comments", v + "f 1 3 2 # a floor\nf 1 2 4#wall\n#f 9 9 9\nf\t1 4 3 \n  f 2 3 4\n"},
       {"CRLF, continued",
        "v 0 0 0\r\nv 1 0 \\\r\n0\r\nv 0 2 0\r\nv 0 0 3\r\nf 1 \\\r\n3 2\r\nf 1 2 4\r\nf 1 4 3\r\nf 2 3 \\\r\n4"},
+      {"CR alone", "# a\rv 0 0 0\rv 1 0 0\rv 0 2 0\rv 0 0 3\rf 1 3 2\rf 1 2 4\rf 1 4 3\rf 2 3 4\r"},
       {"vertices last", "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n" + v},
   };
   for (const auto& [what, content] : ways) {

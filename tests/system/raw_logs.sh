@@ -14,7 +14,8 @@ import math, struct, sys
 def log(path, hover=0.4, gaps=False, parameters=()):
     def message(kind, body): return struct.pack("<Hc", len(body), kind) + body
     topics = [("vehicle_local_position", "float x;float y;float z;float vx;float vy;float vz;", "<Q6f"), ("vehicle_attitude", "float[4] q;", "<Q4f"),
-              ("vehicle_attitude_setpoint", "float[4] q_d;", "<Q4f"), ("vehicle_thrust_setpoint", "float[3] xyz;", "<Q3f")]
+              ("vehicle_attitude_setpoint", "float[4] q_d;", "<Q4f"), ("vehicle_thrust_setpoint", "float[3] xyz;", "<Q3f"),
+              ("vehicle_local_position_setpoint", "float x;float y;float z;float vx;float vy;float vz;float[3] acceleration;", "<Q9f")]
     out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
     for name, fields, _ in topics: out += message(b"F", f"{name}:uint64_t timestamp;{fields}".encode())
     for name, value in {"MPC_XY_P": 0.95, "MPC_XY_VEL_P_ACC": 1.8, "MPC_Z_P": 1.0, "MPC_Z_VEL_P_ACC": 4.0, "MPC_THR_HOVER": 0.5, "THR_MDL_FAC": 0.2,
@@ -26,8 +27,11 @@ def log(path, hover=0.4, gaps=False, parameters=()):
     for k in range(2000):
         t = 0.02 * k
         asked = 0.1 * math.sin(3 * t) + 0.05 * math.sin(7 * t)
+        error, vx = 0.1 * math.sin(2.3 * t), 0.3 * math.cos(t)  # flown with gains of 1.2 and 2.5, and a controller's noise
+        vx_sp = 1.2 * error + 0.004 * math.sin(50 * t)
         for number, values in enumerate([(0.3 * math.sin(t), 0, -1, 0.3 * math.cos(t), 0, 0), (math.cos(pitch / 2), 0, math.sin(pitch / 2), 0),
-                                         (math.cos(asked / 2), 0, math.sin(asked / 2), 0), (0, 0, -hover)]):
+                                         (math.cos(asked / 2), 0, math.sin(asked / 2), 0), (0, 0, -hover),
+                                         (0.3 * math.sin(t) + error, 0, -1, vx_sp, 0, 0, 2.5 * (vx_sp - vx), 0, 0)]):
             out += message(b"D", struct.pack("<H", number) + struct.pack(topics[number][2], int(1e6 + 1e6 * t), *values))
         pitch += (1 - math.exp(-0.02 / 0.08)) * (asked - pitch)
     open(path, "wb").write(out[:9000] + out[9300:] if gaps else out)
@@ -57,6 +61,12 @@ said = json.load(open("report.json"))
 assert abs(said["hover"]["value"] - 0.4) < 0.005 and abs(said["attitude_lag"]["value"] - 0.08) < 0.01
 assert not any("another vehicle" in note for note in said["notes"])
 assert {q["asks"]: bool(q["without"]) for q in said["questions"]}["variance of the air in hover"]
+assert [said["gains"][k][1] for k in ("position", "velocity")] == [None, None]  # it did not move along z
+for name, flown in (("position", 1.2), ("velocity", 2.5)):
+    gain = said["gains"][name][0]
+    assert gain["low"] < flown < gain["high"] and gain["high"] < 1.1 * gain["low"], gain
+assert said["notes"][-1].startswith("next flight, for variance of the air in hover: "), said["notes"]
+assert all(word in open("page.html").read() for word in ("cannot be told", "0.95 1/s"))
 assert all(word in open("page.html").read() for word in ("MPC_THR_HOVER 0.5", "-20 %", "MPC_XY_VEL_P_ACC", "What can be asked"))
 EOF
 sed 's/^max_thrust = [0-9.]*/max_thrust = 14/' own.toml >other.toml

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <limits>
 
 #include "core/log/columns/column_law.hpp"
 #include "core/log/columns/local_cubic.hpp"
@@ -41,68 +43,99 @@ std::optional<Vec3> axis_near(const Vec3& v) {
   return std::nullopt;
 }
 
-Mat3 rotation_at(const FlightLog& log, std::size_t row) {
-  return Eigen::Quaterniond(log.column("qw")[row], log.column("qx")[row], log.column("qy")[row], log.column("qz")[row])
-      .normalized()
-      .toRotationMatrix();
+/// A reading of four columns as an attitude: the column of the scalar, the others after it; turned round or not.
+struct Reading {
+  std::size_t scalar = 0;
+  bool inverse = false;
+};
+constexpr Reading kReadings[] = {{0, false}, {3, false}, {1, false}, {0, true}, {3, true}, {1, true}};
+
+Mat3 rotation_at(const FlightLog& log, std::size_t row, const Reading& reading = {}) {
+  const auto part = [&](std::size_t k) { return log.column(kAttitude[(reading.scalar + k) % 4])[row]; };
+  const Eigen::Quaterniond q(part(0), part(1), part(2), part(3));
+  return (reading.inverse ? q.conjugate() : q).normalized().toRotationMatrix();
 }
 
 /// By the specific force, which a hover alone tells.
-std::optional<UpAxes> by_force(const FlightLog& log) {
+std::optional<UpAxes> by_force(const FlightLog& log, const Reading& reading = {}) {
   Vec3 world = Vec3::Zero(), body = Vec3::Zero();
   const auto n = static_cast<double>(log.t_s.size());
   for (std::size_t row = 0; row < log.t_s.size(); ++row) {
     const Vec3 f = xyz(log, "specific_force_", "", row) / kGravity;
     body += f / n;
-    world += rotation_at(log, row) * f / n;
+    world += rotation_at(log, row, reading) * f / n;
   }
   const auto up = axis_near(world), of_body = axis_near(body);
   if (!up || !of_body) return std::nullopt;
   return UpAxes{*up, *of_body};
 }
 
-/// Sums of two directions, to see how one follows the other.
-struct Followed {
-  double n = 0, squares = 0, apart = 0;
-  Vec3 sum_a = Vec3::Zero(), sum_b = Vec3::Zero();
-  void add(const Vec3& a, const Vec3& b) {
-    n += 1;
-    squares += a.squaredNorm() + b.squaredNorm();
-    apart += (a - b).squaredNorm();
-    sum_a += a;
-    sum_b += b;
+/// Accelerations of the positions, and the rows beside them, of kMostRows rows at most.
+class Thrust {
+ public:
+  explicit Thrust(const FlightLog& log) : log_(log) {
+    constexpr std::size_t kMostRows = 4000;
+    std::vector<Vec3> p;
+    for (std::size_t row = 0; row < log.t_s.size(); ++row) p.push_back(xyz(log, "", "_m", row));
+    const auto motion = local_cubics_but_for_holds(log.t_s, p);
+    for (std::size_t row = 0; row < p.size(); row += 1 + p.size() / kMostRows) {
+      if (!motion[row]) continue;
+      a_.push_back(motion[row]->a);
+      rows_.push_back(row);
+    }
   }
-  /// 1 − var(a − b)/(var a + var b): 1 of the same, 0 of strangers, −1 of opposites.
-  double share() const {
-    const double both = squares - (sum_a.squaredNorm() + sum_b.squaredNorm()) / n;
-    return both > 0 ? 1 - (apart - (sum_a - sum_b).squaredNorm() / n) / both : 0;
+
+  /// The axes along which thrust accelerates (3-11).
+  std::optional<UpAxes> up(const Reading& reading) const {
+    std::vector<Mat3> R;
+    for (const std::size_t row : rows_) R.push_back(rotation_at(log_, row, reading));
+    std::optional<UpAxes> best;
+    double most = kFollows, next = -1;
+    for (const Vec3& world : axes())
+      for (const Vec3& body : axes()) {
+        const double share = share_of(world, body, R);
+        if (share > most) {
+          next = best ? most : next;
+          most = share;
+          best = UpAxes{world, body};
+        } else {
+          next = std::max(next, share);
+        }
+      }
+    return best && next < kStranger ? best : std::nullopt;
   }
-  bool near() const { return sum_a.dot(sum_b) > kNearAxis * sum_a.norm() * sum_b.norm(); }
+
+ private:
+  /// 1 − var(n − R b)/(var n + var R b): 1 of the same, 0 of strangers, −1 of opposites and of what is not near.
+  double share_of(const Vec3& world, const Vec3& body, const std::vector<Mat3>& R) const {
+    double squares = 0, apart = 0;
+    Vec3 sum_n = Vec3::Zero(), sum_b = Vec3::Zero();
+    for (std::size_t row = 0; row < R.size(); ++row) {
+      const Vec3 n = (a_[row] + kGravity * world).normalized(), b = R[row] * body;
+      squares += n.squaredNorm() + b.squaredNorm();
+      apart += (n - b).squaredNorm();
+      sum_n += n;
+      sum_b += b;
+    }
+    if (!(sum_n.dot(sum_b) > kNearAxis * sum_n.norm() * sum_b.norm())) return -1;
+    const auto rows = static_cast<double>(R.size());
+    const double both = squares - (sum_n.squaredNorm() + sum_b.squaredNorm()) / rows;
+    return both > 0 ? 1 - (apart - (sum_n - sum_b).squaredNorm() / rows) / both : -1;
+  }
+
+  const FlightLog& log_;
+  std::vector<Vec3> a_;
+  std::vector<std::size_t> rows_;
 };
 
-/// By what thrust along the body's axis accelerates.
-std::optional<UpAxes> by_thrust(const FlightLog& log) {
-  std::vector<Vec3> p;
-  for (std::size_t row = 0; row < log.t_s.size(); ++row) p.push_back(xyz(log, "", "_m", row));
-  const auto motion = local_cubics_but_for_holds(log.t_s, p);
-  std::optional<UpAxes> best;
-  double most = kFollows, next = -1;
-  for (const Vec3& up : axes())
-    for (const Vec3& body : axes()) {
-      Followed pair;
-      for (std::size_t row = 0; row < p.size(); ++row)
-        if (motion[row]) pair.add((motion[row]->a + kGravity * up).normalized(), rotation_at(log, row) * body);
-      if (pair.n == 0 || !pair.near()) continue;
-      const double share = pair.share();
-      if (share > most) {
-        next = best ? most : next;
-        most = share;
-        best = UpAxes{up, body};
-      } else {
-        next = std::max(next, share);
-      }
-    }
-  return best && next < kStranger ? best : std::nullopt;
+/// What a column map has to say for a reading.
+std::string keys_of(const Reading& reading) {
+  std::string keys;
+  for (std::size_t k = 0; reading.scalar > 0 && k < 4; ++k)
+    keys += std::string(k > 0 ? ", " : "") + kAttitude[k] + " from the column given as " +
+            kAttitude[(reading.scalar + k) % 4];
+  if (reading.inverse) keys += std::string(keys.empty() ? "" : ", ") + "frame.attitude = \"world to body\"";
+  return keys;
 }
 
 }  // namespace
@@ -166,7 +199,30 @@ Turn upright_body(const Vec3& up) {
 std::optional<UpAxes> up_axes(const FlightLog& log) {
   if (!has_all(log, kAttitude) || log.t_s.empty()) return std::nullopt;
   if (has_xyz(log, "specific_force_", "")) return by_force(log);
-  return by_thrust(log);
+  return Thrust(log).up({});
+}
+
+std::vector<AxesReading> axes_readings(const FlightLog& log) {
+  if (!has_all(log, kAttitude) || log.t_s.empty()) return {};
+  const Thrust thrust(log);
+  const bool force = has_xyz(log, "specific_force_", "");
+  const auto same = [](const UpAxes& a, const UpAxes& b) { return a.world == b.world && a.body == b.body; };
+  std::vector<AxesReading> moved, weighed, all;
+  for (const Reading& reading : kReadings) {
+    const auto up = thrust.up(reading), felt = force ? by_force(log, reading) : up;
+    if (felt && std::ranges::none_of(weighed, [&](const auto& r) { return same(r.up, *felt); }))
+      weighed.push_back({*felt, keys_of(reading)});
+    if (up && felt && same(*up, *felt)) moved.push_back({*up, keys_of(reading)});
+  }
+  if (moved.empty()) moved = weighed;  // by the weight alone
+  const auto highest = [&](const AxesReading& reading) {
+    double most = -std::numeric_limits<double>::infinity();
+    for (std::size_t row = 0; row < log.t_s.size(); ++row)
+      most = std::max(most, reading.up.world.dot(xyz(log, "", "_m", row)));
+    return most;
+  };
+  std::ranges::copy_if(moved, std::back_inserter(all), [&](const auto& r) { return highest(r) > -kAtFloor; });
+  return all.empty() ? moved : all;
 }
 
 std::optional<Vec3> body_up(const FlightLog& log, const Vec3& up) {

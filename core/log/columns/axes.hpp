@@ -43,6 +43,16 @@ struct UpAxes {
 /// Columns as in a flight log, in axes that may be turned; specific_force_x … in the body's, m/s².
 std::optional<UpAxes> up_axes(const FlightLog& log);
 
+/// A way to read the four columns of an attitude, and the axes that are up then.
+struct AxesReading {
+  UpAxes up;
+  std::string keys;  ///< what a column map has to say for it; empty: the attitude as it stands
+};
+/// Every reading under which the flight tells its axes, that of the attitude as it stands first: its scalar may stand
+/// in the first or the last column, and it may turn the world into the body. An inverse attitude in a world with z up
+/// moves as an attitude with z down; a reading that has the craft below 0 throughout is left out where another has not.
+std::vector<AxesReading> axes_readings(const FlightLog& log);
+
 /// Which of the body's axes is up on the mean, where `up` is the world's. Nothing: there is no attitude, or none is.
 std::optional<Vec3> body_up(const FlightLog& log, const Vec3& up);
 

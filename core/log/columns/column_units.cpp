@@ -19,7 +19,7 @@ struct Unit {
 };
 constexpr double kFoot = 0.3048;  // m
 constexpr Unit kTime[] = {{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
-constexpr Unit kLength[] = {{"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}, {"ft", kFoot}};
+constexpr Unit kLength[] = {{"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}, {"ft", kFoot}, {"in", kFoot / 12}};
 constexpr Unit kSpeed[] = {{"m/s", 1},        {"cm/s", 1e-2},        {"mm/s", 1e-3},
                            {"km/h", 1 / 3.6}, {"kn", 1852 / 3600.0}, {"ft/s", kFoot}};
 constexpr Unit kAcceleration[] = {{"m/s2", 1}, {"g", kGravity}, {"cm/s2", 1e-2}, {"mm/s2", 1e-3}, {"ft/s2", kFoot}};

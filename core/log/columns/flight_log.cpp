@@ -27,10 +27,22 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-std::vector<std::string_view> cells_of(std::string_view line) {
+/// Text whose lines end as ours do: old programs ended them by a carriage return alone.
+std::string with_lines(std::string text) {
+  if (text.find('\n') == text.npos) std::ranges::replace(text, '\r', '\n');
+  return text;
+}
+
+/// What a table whose first line is `line` puts between its cells: spreadsheets of half the world write semicolons.
+char separator_of(std::string_view line) {
+  const auto at = line.find_first_of(";\t");
+  return at == std::string_view::npos ? ',' : line[at];
+}
+
+std::vector<std::string_view> cells_of(std::string_view line, char separator) {
   std::vector<std::string_view> cells;
   while (true) {
-    const auto comma = line.find(',');
+    const auto comma = line.find(separator);
     cells.push_back(trimmed(line.substr(0, comma)));
     if (comma == std::string_view::npos) return cells;
     line.remove_prefix(comma + 1);
@@ -58,13 +70,15 @@ tl::unexpected<LogError> bad(const std::string& path, std::size_t line, const st
 }
 
 /// The columns that the first line names.
-tl::expected<std::vector<std::string>, LogError> read_names(std::istream& file, const std::string& path) {
+tl::expected<std::vector<std::string>, LogError> read_names(std::istream& file, const std::string& path,
+                                                            char& separator) {
   std::string text;
   if (!std::getline(file, text)) return bad(path, 1, "the file is empty; the first line must name the columns");
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // spreadsheets write it
   if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
   std::vector<std::string> names;
-  for (const auto cell : cells_of(text)) {
+  separator = separator_of(text);
+  for (const auto cell : cells_of(text, separator)) {
     if (cell.empty())
       return bad(path, 1, "column " + std::to_string(names.size() + 1) + " has no name; name every column");
     names.emplace_back(cell);
@@ -79,12 +93,13 @@ tl::expected<std::vector<std::string>, LogError> read_names(std::istream& file, 
 /// The values below the first line by column, none of columns in `unread`.
 tl::expected<std::vector<std::vector<double>>, LogError> read_rows(std::istream& file, const std::string& path,
                                                                    const std::vector<std::string>& names,
-                                                                   const std::set<std::string>& unread, bool gaps) {
+                                                                   const std::set<std::string>& unread, bool gaps,
+                                                                   char separator) {
   std::vector<std::vector<double>> values(names.size());
   std::string text;
   for (std::size_t line = 2; std::getline(file, text); ++line) {
     if (trimmed(text).empty()) continue;
-    const auto cells = cells_of(text);
+    const auto cells = cells_of(text, separator);
     if (cells.size() != names.size())
       return bad(path, line,
                  std::to_string(cells.size()) + " cells where the first line names " + std::to_string(names.size()) +
@@ -162,20 +177,22 @@ tl::expected<std::string, LogError> read_log_file(const std::string& path, std::
 tl::expected<std::vector<std::string>, LogError> csv_names(const std::string& path) {
   auto content = read_log_file(path, files::kLargestTable, "a readable CSV file");
   if (!content) return tl::make_unexpected(content.error());
-  std::istringstream file(std::move(*content));
-  return read_names(file, path);
+  std::istringstream file(with_lines(std::move(*content)));
+  char separator = ',';
+  return read_names(file, path, separator);
 }
 
 tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column,
                                            const std::set<std::string>& unread, bool gaps) {
   auto content = read_log_file(path, files::kLargestTable, "a readable CSV file");
   if (!content) return tl::make_unexpected(content.error());
-  std::istringstream file(std::move(*content));
-  const auto names = read_names(file, path);
+  std::istringstream file(with_lines(std::move(*content)));
+  char separator = ',';
+  const auto names = read_names(file, path, separator);
   if (!names) return tl::make_unexpected(names.error());
   if (!time_column.empty() && std::ranges::find(*names, time_column) == names->end())
     return bad(path, 1, "no column '" + time_column + "'; the first line must name it");
-  auto values = read_rows(file, path, *names, unread, gaps);
+  auto values = read_rows(file, path, *names, unread, gaps, separator);
   if (!values) return tl::make_unexpected(values.error());
   FlightLog log;
   for (std::size_t i = 0; i < names->size(); ++i) {

@@ -25,10 +25,10 @@ struct LogError {
   std::string message;
 };
 
-/// Reads comma-separated numbers under a line of column names. Errors: missing file, no t_s column (unless
-/// `time_column` names another or is empty), a duplicated name, a row with too few or too many cells, a cell that is
-/// not a finite number. Columns named in `unread` are left out, whatever their cells hold. With `gaps`, a cell that is
-/// empty or nan is NaN. A file that gzip made is read as what is in it.
+/// Reads numbers between commas, or between what semicolons or tabs its first line has, under that line of names.
+/// Errors: missing file, no t_s column (unless `time_column` names another or is empty), a duplicated name, a row with
+/// too few or too many cells, a cell that is not a finite number. Columns named in `unread` are left out, whatever
+/// their cells hold. With `gaps`, a cell that is empty or nan is NaN. A file that gzip made is read as what is in it.
 tl::expected<FlightLog, LogError> read_csv(const std::string& path, const std::string& time_column = "t_s",
                                            const std::set<std::string>& unread = {}, bool gaps = false);
 

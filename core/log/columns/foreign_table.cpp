@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 #include <optional>
@@ -45,6 +47,21 @@ Cells cut(std::string_view line, char separator) {
   }
 }
 
+/// "2024-08-23 16:23:49.12", with a T between or a zone behind: s since 1970, as a clock there. Nothing: it is no date.
+std::optional<double> date_in(const std::string& text) {
+  int year = 0;
+  unsigned month = 0, day = 0, hour = 0, minute = 0;
+  double second = 0;
+  char between = 0;
+  if (std::sscanf(text.c_str(), "%4d-%2u-%2u%c%2u:%2u:%lf", &year, &month, &day, &between, &hour, &minute, &second) !=
+      7)
+    return std::nullopt;
+  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(month), std::chrono::day(day)};
+  if (!date.ok() || hour > 23 || minute > 59 || !(second < 61)) return std::nullopt;
+  const auto days = std::chrono::sys_days(date).time_since_epoch().count();
+  return 86400.0 * static_cast<double>(days) + 3600.0 * hour + 60.0 * minute + second;
+}
+
 /// NaN of a gap; nothing of a text.
 std::optional<double> number_in(std::string_view cell, bool decimal_comma) {
   const std::string text = lower_case(cell);
@@ -54,6 +71,7 @@ std::optional<double> number_in(std::string_view cell, bool decimal_comma) {
   const char* begin = plain.data() + (plain.starts_with('+') ? 1 : 0);
   double value = 0;
   const auto [end, error] = std::from_chars(begin, plain.data() + plain.size(), value);
+  if (end != plain.data() + plain.size() && plain.size() > 10) return date_in(plain);
   if (error != std::errc{} || end != plain.data() + plain.size() || !std::isfinite(value)) return std::nullopt;
   return value;
 }
@@ -112,7 +130,7 @@ Cells header_line(std::string_view line, const Shape& shape) {
 
 bool blank(const Cells& cells) { return std::ranges::all_of(cells, &std::string_view::empty); }
 
-/// "name [unit]" or "name (unit)" apart, where the unit is known or empty.
+/// "name [unit]" or "name (unit)" apart, where the unit is known or empty; of "name_unit" the unit alone.
 std::pair<std::string, std::string> apart(std::string_view text) {
   for (const auto& [open, close] : {std::pair{'[', ']'}, {'(', ')'}}) {
     const auto at = text.rfind(open);
@@ -121,7 +139,7 @@ std::pair<std::string, std::string> apart(std::string_view text) {
     if (const auto unit = unit_called(std::string(inner)); !unit.empty() || inner.empty())
       return {std::string(bare(text.substr(0, at))), unit};
   }
-  return {std::string(text), ""};
+  return {std::string(text), unit_in_name(std::string(text))};
 }
 
 /// Empty cells take what stands left of them.
@@ -210,12 +228,22 @@ std::string unit_called(const std::string& text) {
       {"seconds", "s"},      {"sec", "s"},      {"meters", "m"},    {"metres", "m"},    {"millimeters", "mm"},
       {"millimetres", "mm"}, {"m s^-1", "m/s"}, {"m s-1", "m/s"},   {"m s^-2", "m/s2"}, {"m/s^2", "m/s2"},
       {"m s-2", "m/s2"},     {"m/s²", "m/s2"},  {"degrees", "deg"}, {"°", "deg"},       {"radians", "rad"},
-      {"µs", "us"},          {"volt", "V"},     {"%", "percent"},   {"rpm", "1/min"}};
+      {"µs", "us"},          {"volt", "V"},     {"%", "percent"},   {"rpm", "1/min"},   {"inches", "in"},
+      {"inch", "in"},        {"feet", "ft"},    {"mps", "m/s"},     {"mps2", "m/s2"},   {"celsius", "degC"},
+      {"kmh", "km/h"},       {"knots", "kn"},   {"nsec", "ns"},     {"usec", "us"},     {"msec", "ms"},
+      {"secs", "s"},         {"cmps", "cm/s"},  {"mmps", "mm/s"}};
   if (const auto at = known.find(lower_case(text)); at != known.end()) return at->second;
   static const std::vector<std::string> ours = all_units();
   for (const auto& unit : ours)
     if (unit == text || (unit.size() > 1 && lower_case(unit) == lower_case(text))) return unit;
   return "";
+}
+
+std::string unit_in_name(const std::string& name) {
+  const auto at = name.find_last_of("_ ");
+  if (at == std::string::npos || at == 0) return "";
+  const auto unit = unit_called(name.substr(at + 1));
+  return unit == "1" ? "" : unit;  // "motor_1" counts
 }
 
 tl::expected<ForeignTable, LogError> read_foreign_table(const std::string& path) {
@@ -227,8 +255,9 @@ tl::expected<ForeignTable, LogError> read_foreign_table(const std::string& path)
   std::string_view text = *content;
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // spreadsheets write it
   std::vector<std::string_view> lines;
+  const char line_end = text.find('\n') == text.npos ? '\r' : '\n';
   while (!text.empty()) {
-    const auto end = std::min(text.find('\n'), text.size());
+    const auto end = std::min(text.find(line_end), text.size());
     lines.push_back(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
   }
@@ -259,6 +288,8 @@ tl::expected<ForeignTable, LogError> read_foreign_table(const std::string& path)
         table.columns[c].text_line = i + 1;
         table.columns[c].text = cells[c];
       }
+      if (value && !table.columns[c].dates && cells[c].size() > 10 && cells[c].find(':') != cells[c].npos)
+        table.columns[c].dates = true;
       table.columns[c].values.push_back(value.value_or(std::numeric_limits<double>::quiet_NaN()));
     }
   }

@@ -31,7 +31,7 @@ std::vector<std::pair<std::size_t, std::string>> first_cells(std::string content
   std::getline(file, text);
   for (std::size_t line = 2; std::getline(file, text); ++line) {
     if (text.find_first_not_of(kBlank) == std::string::npos) continue;
-    std::string cell = text.substr(0, text.find(','));
+    std::string cell = text.substr(0, text.find_first_of(",;\t"));
     const auto begin = std::min(cell.find_first_not_of(kBlank), cell.size());
     cell = cell.substr(begin, cell.find_last_not_of(kBlank) + 1 - begin);
     cells.emplace_back(line, std::move(cell));

@@ -44,15 +44,21 @@ std::vector<std::optional<LocalMotion>> local_cubics(const std::vector<double>& 
   return motion;
 }
 
+std::vector<Hold> holds(const std::vector<double>& t, const std::vector<Vec3>& p) {
+  std::vector<Hold> all;
+  for (std::size_t first = 0, next = 0; first < t.size(); first = next) {
+    for (next = first + 1; next < t.size() && p[next] == p[first];) ++next;
+    if (t[std::min(next, t.size() - 1)] - t[first] > 2 * kHalfWidth) all.push_back({first, next});
+  }
+  return all;
+}
+
 std::vector<std::optional<LocalMotion>> local_cubics_but_for_holds(const std::vector<double>& t,
                                                                    const std::vector<Vec3>& p) {
   auto motion = local_cubics(t, p);
-  for (std::size_t first = 0, next = 0; first < t.size(); first = next) {
-    for (next = first + 1; next < t.size() && p[next] == p[first];) ++next;
-    const double end = t[std::min(next, t.size() - 1)];  // until something else was said
-    if (end - t[first] <= 2 * kHalfWidth) continue;
+  for (const auto& [first, next] : holds(t, p)) {
     const auto from = std::lower_bound(t.begin(), t.end(), t[first] - kHalfWidth);
-    const auto to = std::upper_bound(t.begin(), t.end(), end + kHalfWidth);
+    const auto to = std::upper_bound(t.begin(), t.end(), t[std::min(next, t.size() - 1)] + kHalfWidth);
     std::fill(motion.begin() + (from - t.begin()), motion.begin() + (to - t.begin()), std::nullopt);
   }
   return motion;

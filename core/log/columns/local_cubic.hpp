@@ -18,8 +18,14 @@ struct LocalMotion {
 /// are that near, or less than 0.06 s of them on one side: a gap, or an end. `t`: s, rising.
 std::vector<std::optional<LocalMotion>> local_cubics(const std::vector<double>& t, const std::vector<Vec3>& p);
 
-/// The same, and nothing within 0.12 s of places that were held for longer than 0.24 s: an estimate that froze goes on
-/// by a leap, which is no motion. Positions that are logged at 5 Hz or more are not held so long.
+/// Rows [first, next) of places that were held for longer than 0.24 s, until something else was said: an estimate that
+/// froze, or a craft that nothing measured. Positions that are logged at 5 Hz or more are not held so long.
+struct Hold {
+  std::size_t first, next;
+};
+std::vector<Hold> holds(const std::vector<double>& t, const std::vector<Vec3>& p);
+
+/// The same as local_cubics, and nothing within 0.12 s of holds, which go on by a leap that is no motion.
 std::vector<std::optional<LocalMotion>> local_cubics_but_for_holds(const std::vector<double>& t,
                                                                    const std::vector<Vec3>& p);
 

@@ -17,13 +17,14 @@
 namespace backwash::log {
 namespace {
 
-constexpr double kLeastSpeed = 0.05;         // m/s, rms: what a sane velocity may be off by
-constexpr double kLeastAcceleration = 0.25;  // m/s², rms
-constexpr double kSettled = 0.06;            // s on each side: what accelerations are averaged over beside tilts
-constexpr double kMostThrustToWeight = 2.5;  // on the mean, or its inverse: what a tilt may accelerate more, or less
-constexpr double kLongestStep = 0.5;         // s, between rows on the median
-constexpr double kLength[] = {0.9, 1.1};     // of an attitude
-constexpr double kGravityLeft = 2.5;         // m/s², of the median vertical acceleration
+constexpr double kLeastSpeed = 0.05;            // m/s, rms: what a sane velocity may be off by
+constexpr double kLeastAcceleration = 0.25;     // m/s², rms
+constexpr double kSettled = 0.06;               // s on each side: what accelerations are averaged over beside tilts
+constexpr double kMostThrustToWeight = 2.5;     // on the mean, or its inverse: what a tilt may accelerate more, or less
+constexpr double kLongestStep = 0.5;            // s, between rows on the median
+constexpr double kLength[] = {0.9, 1.1};        // of an attitude
+constexpr double kGravityLeft = 2.5;            // m/s², of the median vertical acceleration
+constexpr double kFastest = 50, kHardest = 30;  // m/s and m/s², rms over a flight: beyond any multirotor
 constexpr double kMostThrust = 1.2, kLeastThrust = -0.05;
 
 using Names = std::array<const char*, 3>;
@@ -113,6 +114,31 @@ Doubts of_motion(const FlightLog& log, const Motion& motion, const Names& names,
                    both.said, both.derived);
 }
 
+/// Positions that move as no multirotor does.
+Doubts of_extent(const Motion& motion) {
+  double n = 0, v = 0, a = 0;
+  for (const auto& m : motion) {
+    if (!m) continue;
+    n += 1;
+    v += m->v.squaredNorm();
+    a += m->a.squaredNorm();
+  }
+  v = std::sqrt(v / n);
+  a = std::sqrt(a / n);
+  if (n == 0 || (v <= kFastest && a <= kHardest)) return {};
+  std::string fitting;
+  for (const auto& unit : units_of(kP[0]))
+    if (const double f = *unit_factor(kP[0], unit); f < 1 && f * v <= kFastest && f * a <= kHardest)
+      fitting +=
+          (fitting.empty() ? "" : " or ") + unit + formatted(" (%.3g m/s,", f * v) + formatted(" %.3g m/s²)", f * a);
+  return {{list(kP),
+           "x_m, y_m and z_m move by" + formatted(" %.4g m/s and", v) +
+               formatted(" %.4g m/s² (rms), as no multirotor does: ", a) +
+               (fitting.empty() ? "which columns are the positions, and in which unit?"
+                                : "give their unit, which fits if it is " + fitting),
+           true}};
+}
+
 Doubts of_gravity(const FlightLog& log) {
   const double left = median(log.column("az_mps2"));
   if (std::abs(left) <= kGravityLeft) return {};
@@ -122,13 +148,18 @@ Doubts of_gravity(const FlightLog& log) {
            true}};
 }
 
+Doubts of_axes(const FlightLog& log) {
+  const auto words = turned_axes(log);
+  return words.empty() ? Doubts{} : Doubts{{list(kP), words, true}};
+}
+
 Doubts of_tilt(const FlightLog& log) {
   return doubts_of({{"tilt along x (pitch)", "tilt along y (roll)"},
-                    {"ax_mps2", "ay_mps2"},
+                    {kP[0], kP[1]},
                     "the tilt that accelerates along the axis",
                     kLeastAcceleration,
                     kMostThrustToWeight,
-                    false,
+                    true,
                     list(kQ)},
                    averaged(log.t_s, tilts(log)), averaged(log.t_s, rows_of(log, kA)));
 }
@@ -227,6 +258,17 @@ Doubts of_attitude(const FlightLog& log) {
 
 }  // namespace
 
+std::string turned_axes(const FlightLog& log) {
+  if (!has_all(log, kP)) return "";
+  const auto readings = axes_readings(log);
+  if (readings.empty() || !readings.front().keys.empty()) return "";
+  const auto& up = readings.front().up;
+  if (up.world == Vec3::UnitZ() && up.body == Vec3::UnitZ()) return "";
+  return "the weight and the thrust are along other axes than z: import it with frame.world = \"" +
+         called(upright_world(up.world), named_worlds()) + "\" and frame.body = \"" +
+         called(upright_body(up.body), named_bodies()) + "\"";
+}
+
 Doubts contradictions(const FlightLog& log) {
   Doubts doubts;
   const auto motion = local_cubics_but_for_holds(log.t_s, rows_of(log, kP));
@@ -235,6 +277,8 @@ Doubts contradictions(const FlightLog& log) {
     if (!has_all(log, names)) continue;
     add(doubts, silent(log, names) ? of_zeros(log, motion, names, second) : of_motion(log, motion, names, second));
   }
+  add(doubts, of_extent(motion));
+  add(doubts, of_axes(log));
   if (has_all(log, kA)) add(doubts, of_gravity(log));
   if (has_all(log, kQ)) add(doubts, of_attitude(log));
   add(doubts, of_commands(log));

@@ -12,6 +12,7 @@
 #include "core/log/autopilot/dataflash.hpp"
 #include "core/log/autopilot/ulog.hpp"
 #include "core/log/columns/import_airgarage.hpp"
+#include "core/log/columns/import_columns.hpp"
 #include "core/log/columns/import_crazypad.hpp"
 #include "core/log/raw/raw_flight.hpp"
 
@@ -24,7 +25,13 @@ using std::string_view_literals::operator""sv;
 tl::expected<FlightLog, LogError> read_raw_flight(const std::string& path) {
   return read_raw_log(path).and_then([&](const RawLog& log) { return flight_of_raw_log(log, path); });
 }
-tl::expected<FlightLog, LogError> read_own(const std::string& path) { return read_csv(path); }
+tl::expected<FlightLog, LogError> read_own(const std::string& path) {
+  auto log = read_csv(path);
+  if (!log || log->t_s.size() < 2) return log;
+  if (const auto turned = turned_axes(*log); !turned.empty())
+    return tl::make_unexpected(LogError{LogError::Kind::bad_data, path + ":1: " + turned});
+  return log;
+}
 
 constexpr std::array kRead{RecordingKind{"airgarage", Form::table, "a table of airgarage", import_airgarage},
                            RecordingKind{"ardupilot", Form::autopilot, "a DataFlash log of ArduPilot", read_dataflash},
@@ -67,6 +74,7 @@ constexpr RecordingKind kHdf =
 constexpr RecordingKind kParquet =
     other("a Parquet file", "python3 -c \"import pandas; pandas.read_parquet('FILE').to_csv('flight.csv')\"");
 constexpr RecordingKind kOctomap = other("a map (OctoMap)", "give it as --map");
+constexpr RecordingKind kShape = other("a mesh or a cloud, no flight", "backwash map convert FILE -o map.bt");
 constexpr RecordingKind kXz = other("packed by xz", "xz -dk FILE");
 constexpr RecordingKind kZstd = other("packed by zstd", "zstd -d FILE");
 constexpr RecordingKind kBzip2 = other("packed by bzip2", "bunzip2 -k FILE");
@@ -89,6 +97,10 @@ constexpr Magic kMagics[] = {{0, "ULog\x01\x12\x35"sv, &kind_called("ulog")},
                              {0, "\x89HDF\r\n\x1a\n"sv, &kHdf},
                              {0, "PAR1"sv, &kParquet},
                              {0, "# Octomap"sv, &kOctomap},
+                             {0, "ply\n"sv, &kShape},
+                             {0, "ply\r"sv, &kShape},
+                             {0, "# .PCD"sv, &kShape},
+                             {0, "glTF"sv, &kShape},
                              {0,
                               "\xfd"
                               "7zXZ\0"sv,
@@ -123,13 +135,26 @@ bool is_tlog(std::string_view begin) {
   return first > 0 && frame(first) > 0;
 }
 
+/// A text of an OBJ, an STL or a glTF, by its first word that is in no comment.
+bool is_shape(std::string_view text) {
+  constexpr std::array kWords{"v", "vt", "vn", "o", "g", "f", "mtllib", "usemtl", "solid", "SOLID", "{"};
+  while (text.starts_with('#')) text.remove_prefix(std::min(text.find_first_of("\r\n"), text.size() - 1) + 1);
+  text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
+  const auto word = text.substr(0, text.find_first_of(" \t\r\n\""));
+  return std::ranges::find(kWords, word) != kWords.end();
+}
+
 /// Which table a text is, by the names in its first line; nothing: it is no text.
 const RecordingKind* table_of(std::string_view begin) {
   const auto control = [](char c) {
     return static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\r' && c != '\n';
   };
   if (begin.empty() || std::ranges::any_of(begin, control)) return nullptr;
-  std::istringstream line{std::string(begin.substr(0, begin.find('\n')))};
+  if (is_shape(begin)) return &kShape;
+  std::string first(begin.substr(0, begin.find('\n')));
+  std::ranges::replace_if(
+      first, [](char c) { return c == ';' || c == '\t'; }, ',');
+  std::istringstream line(first);
   std::set<std::string> names;
   for (std::string name; std::getline(line, name, ',');) {
     std::erase_if(name, [](char c) { return c == ' ' || c == '\r' || c == '"'; });

@@ -38,7 +38,11 @@ tl::expected<RawLog, LogError> raw_log_of_mcap(const std::string& path, std::spa
     return tl::unexpected(LogError{LogError::Kind::bad_data, path + ": byte " + std::to_string(end.at) + ": " + what});
   };
   if (!end.wrong.empty()) return wrong(end.wrong);
-  if (!told) return wrong("no channel " + std::string(kRawTopic) + " before it: not a log of backwashd");
+  if (!told)
+    return wrong("no channel " + std::string(kRawTopic) +
+                 " before it: not a log of backwashd; of a bag the clouds are a map: "
+                 "backwash map convert " +
+                 path + " -o map.bt; its poses: ros2 bag play, and ros2 topic echo --csv");
   if (!end.whole && end.at < bytes.size()) log.cut_at = end.at;
   return log;
 }

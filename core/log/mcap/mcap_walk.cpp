@@ -3,16 +3,21 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <utility>
 
 #include "core/log/mcap/mcap_writer.hpp"
 #include "core/log/octets.hpp"
+#include "core/types/formatted.hpp"
 
 namespace backwash::log {
 namespace {
 
+using std::string_view_literals::operator""sv;
+
+constexpr std::string_view kDataEnd = "\x0f\x04\0\0\0\0\0\0\0"sv;  // its kind and length
 constexpr std::size_t kHead = 1 + 8;  // of every record: its kind and the length of what follows
 
 bool fits(std::uint32_t crc, std::string_view bytes) {
@@ -24,16 +29,28 @@ class Walk {
   Walk(std::string_view file, const McapListener& listener) : file_(file), listener_(listener) {}
 
   McapEnd through() {
+    if (listener_.over_damage) learn();
     std::uint64_t at = kMcapMagic.size();
     while (!end_.whole && end_.wrong.empty()) {
+      damaged_ = false;
       const auto content = record(file_.substr(at));
-      if (!content) {
+      if (content && listener_.over_damage && !begins(at + kHead + content->size()))
+        damage(at, "no record follows this one");
+      else if (content)
+        take(static_cast<McapOp>(file_[at]), *content, at);
+      const auto next = (content && !damaged_) || !listener_.over_damage ? std::nullopt : sound_behind(at);
+      if (next) {
+        end_.places += 1;
+        end_.skipped += *next - at;
+        at = *next;
+      } else if (!content || damaged_) {
         at = cut(at);
         break;
+      } else {
+        at += kHead + content->size();
       }
-      take(static_cast<McapOp>(file_[at]), *content, at);
-      at += kHead + content->size();
     }
+    if (end_.messages == 0 && !first_.empty()) end_.wrong = first_;  // all of it is damaged, or packed unknown to us
     if (end_.wrong.empty()) end_.at = at;
     return std::move(end_);
   }
@@ -65,6 +82,51 @@ class Walk {
     return place_of(messages);
   }
 
+  /// The channels and the count of messages that stand behind the data: damage may have taken the first telling.
+  void learn() {
+    for (auto at = file_.rfind(kDataEnd); at < file_.size();) {
+      const auto content = record(file_.substr(at));
+      const auto op = static_cast<McapOp>(file_[at]);
+      if (!content || op == McapOp::footer) break;
+      if (op == McapOp::schema) schema(*content, at);
+      if (op == McapOp::channel) channel(*content, at);
+      chunked_ = chunked_ || op == McapOp::chunk_index;
+      if (op == McapOp::statistics) end_.counted = Octets(*content).number<std::uint64_t>();
+      at += kHead + content->size();
+    }
+    end_.wrong.clear();
+  }
+
+  /// Whether a record may begin there, or the file ends.
+  bool begins(std::uint64_t at) const {
+    if (file_.size() < at + kHead) return true;
+    const auto op = static_cast<std::uint8_t>(file_[at]);
+    return op >= 1 && op <= static_cast<std::uint8_t>(McapOp::data_end) &&
+           Octets(file_.substr(at + 1)).number<std::uint64_t>() < std::uint64_t{1} << 32;
+  }
+
+  /// Whether a chunk whose lengths agree is there, or, in a file without chunks, a message of a channel that is known.
+  bool sound(std::uint64_t at) const {
+    const auto op = static_cast<McapOp>(file_[at]);
+    if (op != McapOp::chunk && (op != McapOp::message || chunked_)) return false;
+    const auto content = record(file_.substr(at));
+    if (!content || !begins(at + kHead + content->size())) return false;
+    Octets fields(*content);
+    if (op == McapOp::message) return channels_.contains(fields.number<std::uint16_t>()) && fields.good;
+    fields.take(8 + 8 + 8 + 4);
+    fields.text();
+    const auto packed = fields.number<std::uint64_t>();
+    return fields.good && fields.rest().size() == packed;
+  }
+
+  /// Where what is sound goes on behind a damaged place: at the latest where the data end.
+  std::optional<std::uint64_t> sound_behind(std::uint64_t at) const {
+    const auto end = std::min<std::uint64_t>(file_.rfind(kDataEnd), file_.size());
+    for (auto next = at + 1; next < end; ++next)
+      if (sound(next)) return next;
+    return end < file_.size() && end > at ? std::optional(end) : std::nullopt;
+  }
+
   std::uint64_t place_of(std::string_view bytes) const {
     return static_cast<std::uint64_t>(bytes.data() - file_.data());
   }
@@ -76,9 +138,16 @@ class Walk {
     }
   }
 
+  /// Of bytes that are none of what was written.
+  void damage(std::uint64_t at, std::string what) {
+    if (!listener_.over_damage) return fail(at, std::move(what));
+    if (first_.empty()) first_ = std::move(what);
+    damaged_ = true;
+  }
+
   void take(McapOp op, std::string_view content, std::uint64_t at) {
     if (op == McapOp::chunk) chunk(content, at);
-    if (op == McapOp::footer) fail(at, "the file's end comes before that of its data: it is damaged");
+    if (op == McapOp::footer) damage(at, "the file's end comes before that of its data: it is damaged");
     if (op == McapOp::data_end) data_end(content, at);
     in_chunk(op, content, at);
   }
@@ -92,34 +161,36 @@ class Walk {
   void data_end(std::string_view content, std::uint64_t at) {
     Octets fields(content);
     const auto crc = fields.number<std::uint32_t>();
-    if (!fields.good || !fits(crc, file_.substr(0, at)))
+    const bool told = end_.places > 0 || (listener_.over_damage && end_.counted > 0);
+    if (!fields.good || (!told && !fits(crc, file_.substr(0, at))))
       return fail(at, "the checksum of all before it does not fit: the file is damaged");
     end_.whole = true;
   }
 
   void chunk(std::string_view content, std::uint64_t at) {
+    chunked_ = true;
     Octets fields(content);
     fields.take(8 + 8);  // its times
     const auto size = fields.number<std::uint64_t>();
     const auto crc = fields.number<std::uint32_t>();
     const auto compression = fields.text();
     const auto packed = fields.take(fields.number<std::uint64_t>());
-    if (!fields.good) return fail(at, "is no whole chunk");
+    if (!fields.good) return damage(at, "is no whole chunk");
     if (compression.empty()) return records(packed, crc, at, true);
     if (!listener_.unpack)
       return fail(at, "this chunk is compressed; write the file without: mcap decompress FILE -o OTHER.mcap");
     const auto bytes = listener_.unpack(compression, packed, size);
-    if (!bytes) return fail(at, bytes.error());
+    if (!bytes) return damage(at, bytes.error());
     records(*bytes, crc, at, false);
   }
 
   /// Of a chunk; `here`: its bytes are the file's.
   void records(std::string_view bytes, std::uint32_t crc, std::uint64_t at, bool here) {
-    if (!fits(crc, bytes)) return fail(at, "the chunk's checksum does not fit: the file is damaged");
+    if (!fits(crc, bytes)) return damage(at, "the chunk's checksum does not fit: the file is damaged");
     while (end_.wrong.empty() && !bytes.empty()) {
       const std::uint64_t place = here ? place_of(bytes) : at;
       const auto content = record(bytes);
-      if (!content) return fail(place, "is no whole record");
+      if (!content) return damage(place, "is no whole record");
       in_chunk(static_cast<McapOp>(bytes.front()), *content, place);
       bytes.remove_prefix(kHead + content->size());
     }
@@ -148,7 +219,8 @@ class Walk {
     fields.take(4 + 8 + 8);  // its own number, its times
     if (!fields.good) return fail(at, "is no whole message");
     const auto channel = channels_.find(number);
-    if (channel == channels_.end()) return fail(at, "a message of a channel that is not told before it");
+    if (channel == channels_.end()) return damage(at, "a message of a channel that is not told before it");
+    end_.messages += 1;
     if (listener_.message) fail(at, listener_.message(channel->second, fields.rest(), at));
   }
 
@@ -157,9 +229,23 @@ class Walk {
   std::map<std::uint16_t, std::string> types_;
   std::map<std::uint16_t, McapChannel> channels_;
   McapEnd end_;
+  bool chunked_ = false;
+  bool damaged_ = false;  // the record that was taken last
+  std::string first_;     // what was wrong with the first of them
 };
 
 }  // namespace
+
+std::string McapEnd::loss(std::size_t bytes) const {
+  if (places == 0 && counted <= messages) return "";
+  const auto share = [](auto lost, auto all) {
+    return formatted("%.2g %%", 100.0 * static_cast<double>(lost) / static_cast<double>(all));
+  };
+  return "it is damaged in " + std::to_string(places) + " places: " +
+         (counted > messages ? share(counted - messages, counted) + " of its messages"
+                             : share(skipped, bytes) + " of it") +
+         " lost";
+}
 
 McapEnd walk_mcap(std::string_view file, const McapListener& listener) { return Walk(file, listener).through(); }
 

@@ -26,12 +26,19 @@ struct McapListener {
   std::function<tl::expected<std::string, std::string>(std::string_view compression, std::string_view packed,
                                                        std::uint64_t size)>
       unpack;
+  /// Whether to read on behind damage, with the next chunk that is whole. Who says that something is wrong ends it
+  /// still.
+  bool over_damage = false;
 };
 
 struct McapEnd {
-  std::string wrong;     ///< what, or nothing
-  std::uint64_t at = 0;  ///< byte of the file: where it is wrong, else behind the last whole record
-  bool whole = false;    ///< the data ended as it should; else the file was cut short, at `at`
+  std::string wrong;                        ///< what, or nothing
+  std::uint64_t at = 0;                     ///< byte of the file: where it is wrong, else behind the last whole record
+  bool whole = false;                       ///< the data ended as it should; else the file was cut short, at `at`
+  std::size_t places = 0, skipped = 0;      ///< damaged ones that were left out; bytes of them
+  std::uint64_t messages = 0, counted = 0;  ///< that were read; that the file says it has, 0 where it does not
+  /// What over_damage left out of a file of so many bytes, a sentence; empty: nothing.
+  std::string loss(std::size_t bytes) const;
 };
 
 /// Goes through the records of an MCAP file (https://mcap.dev/spec) from its beginning. No index is asked, so a file

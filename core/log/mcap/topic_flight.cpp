@@ -234,10 +234,8 @@ TopicLog::Topic valid_ones(const TopicLog::Topic& position, std::vector<std::str
       valid[k] = valid[k] != 0 && said->second[k] != 0 ? 1 : 0;
     }
     if (wrong > 0)
-      notes.push_back(
-          formatted("its %s is not valid in %.3g %% of the messages, as its estimator says (%s; "
-                    "ArduPilot: SS of XKF4 or NKF4)",
-                    what, 100.0 * static_cast<double>(wrong) / static_cast<double>(valid.size()), flag));
+      notes.push_back(formatted("its %s is not valid in %.3g %% of the messages, as its estimator says (%s)", what,
+                                100.0 * static_cast<double>(wrong) / static_cast<double>(valid.size()), flag));
   }
   TopicLog::Topic kept{position.name, position.instance, {}, {}};
   double left_out = 0;

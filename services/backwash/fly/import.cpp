@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <set>
 #include <utility>
 
 #include "core/log/autopilot/same_flight.hpp"
@@ -16,9 +17,7 @@
 namespace backwash::services {
 namespace {
 
-/// Reads a recording; what was left out of it, a sentence each, goes to `notes`.
-using Importer = std::function<tl::expected<log::FlightLog, log::LogError>(const std::string& path,
-                                                                           std::vector<std::string>& notes)>;
+using Importer = std::function<tl::expected<log::FlightLog, log::LogError>(const std::string& path)>;
 
 struct ImportOptions {
   std::string kind, folder, map_columns, columns, labels;
@@ -48,13 +47,13 @@ std::pair<Importer, std::vector<std::string>> importer_of(const ImportOptions& o
     if (kind && options.files.empty())
       throw Failure(kUsage, "no recording given after the kind '" + options.kind + "'");
     const auto read = kind ? kind->read : log::read_recording;
-    return {[read](const std::string& path, auto&) { return read(path); }, kind ? options.files : files};
+    return {read, kind ? options.files : files};
   }
   const auto map = read_column_map(options.map_columns);
   if (!map)
     throw Failure(map.error().kind == config::ConfigError::Kind::not_found ? kNoInput : kConfiguration,
                   map.error().message);
-  return {[map = *map](const std::string& path, auto& notes) { return log::import_columns(path, map, &notes); }, files};
+  return {[map = *map](const std::string& path) { return log::import_columns(path, map); }, files};
 }
 
 [[noreturn]] void fail(const log::LogError& error) {
@@ -95,21 +94,27 @@ void add_labels(log::FlightLog& log, const log::Labels& labels, const std::strin
 int run(const ImportOptions& options) {
   if (options.propose) return propose(options);
   if (!options.columns.empty()) throw Failure(kUsage, "--columns names a table's columns for --propose");
-  const auto [read, files] = importer_of(options);
+  auto [read, files] = importer_of(options);
   if (options.folder.empty()) throw Failure(kUsage, "--out is required: the folder for the flight logs");
   std::error_code error;
   std::filesystem::create_directories(options.folder, error);
   if (!std::filesystem::is_directory(options.folder))
     throw Failure(kCannotCreate, options.folder + ":1: cannot be created; name a folder that can be written");
-  std::vector<std::string> targets;
+  std::vector<std::string> twice, targets;
+  std::set<std::filesystem::path> once;
+  std::erase_if(files, [&](const std::string& file) {
+    const bool again = !once.insert(std::filesystem::weakly_canonical(file, error)).second;
+    if (again) twice.push_back(file + ":1: is given twice; read once");
+    return again;
+  });
   for (const auto& file : files) targets.push_back(target(options.folder, file));
   check_outputs(targets, options.force);
   const auto labels = labels_of(options);
-  Json logs = Json::array(), refused = Json::array();
+  Json logs = Json::array(), refused = twice;
   log::KnownFlights known;
   std::vector<std::string> notes;
   for (const auto& file : files) {
-    auto log = read(file, notes);
+    auto log = read(file);
     if (!log) {
       // A recording without rows is not the end of a hundred others; alone it is an error.
       if (files.size() == 1 || log.error().kind == log::LogError::Kind::not_found) fail(log.error());
@@ -128,7 +133,7 @@ int run(const ImportOptions& options) {
   if (logs.empty()) throw Failure(kBadData, refused.front().get<std::string>());
   if (options.json) {
     print(Json{{"kind", !options.map_columns.empty() ? "columns"
-                        : files == options.files     ? options.kind
+                        : kind_of(options)           ? options.kind
                                                      : "by content"},
                {"logs", logs},
                {"refused", refused},

@@ -9,11 +9,13 @@
 
 #include "core/log/autopilot/airframe.hpp"
 #include "core/log/columns/log_columns.hpp"
+#include "core/report/page/chart.hpp"
 #include "core/report/page/page.hpp"
 #include "core/types/formatted.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/plan/logged_vehicle.hpp"
+#include "services/backwash/plan/shown_gains.hpp"
 
 namespace backwash::services {
 namespace {
@@ -43,6 +45,7 @@ struct Vibration {
   std::string topic;
   double rate_hz = 0, peak_hz = 0;  ///< how often it was logged; where most of it is, from 5 Hz on
   std::vector<Band> bands;
+  std::array<report::Run, 3> density;  ///< common logarithms of Hz and (m/s²)²/Hz, along each axis of the body
 };
 
 /// Welch's spectrum (Hann, halves overlapping) of the accelerometer that was logged most often, in octaves below half
@@ -61,7 +64,7 @@ std::optional<Vibration> vibration_of(const log::TopicLog& topics) {
   std::ranges::nth_element(steps, steps.begin() + std::ssize(steps) / 2);
   const double step = steps[steps.size() / 2];
   if (!(step > 0)) return std::nullopt;
-  Vibration vibration{best->name, 1 / step, 0, {}};
+  Vibration vibration{best->name, 1 / step, 0, {}, {}};
   std::array<std::vector<double>, 3> power;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto& rows = best->columns.at(field + "[" + std::to_string(axis) + "]");
@@ -85,6 +88,11 @@ std::optional<Vibration> vibration_of(const log::TopicLog& topics) {
     for (double& p : power[axis]) p /= parts;
   }
   const double width = 1 / (step * kRows);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::size_t f = 1; f < kRows / 2; ++f)
+      if (power[axis][f] > 0)
+        vibration.density[axis].emplace_back(std::log10(width * static_cast<double>(f)),
+                                             std::log10(power[axis][f] / width));
   double most = 0;
   for (double low = 1; low < 0.5 / step; low *= 2) {
     Band band{low, std::min(2 * low, 0.5 / step), {}};
@@ -145,11 +153,29 @@ Rows loop_rows(const LoggedVehicle& logged) {
     rows.push_back({"attitude lag", "",
                     formatted("%.3g s (%.3g to %.3g)", logged.attitude_lag->value, logged.attitude_lag->low,
                               logged.attitude_lag->high)});
-  for (const char* name :
-       {"MPC_XY_P", "MPC_XY_VEL_P_ACC", "MPC_XY_VEL_I_ACC", "MPC_Z_P", "MPC_Z_VEL_P_ACC", "THR_MDL_FAC",
-        "MPC_TILTMAX_AIR", "EKF2_EV_DELAY", "PSC_POSXY_P", "PSC_VELXY_P", "PSC_POSZ_P", "PSC_VELZ_P", "PSC_NE_POS_P",
-        "PSC_NE_VEL_P", "PSC_D_POS_P", "PSC_D_VEL_P", "ANGLE_MAX", "MOT_THST_EXPO", "VISO_DELAY_MS"})
-    if (const auto found = p.find(name); found != p.end()) rows.push_back({name, formatted("%.4g", found->second), ""});
+  const auto gains = shown_gains(logged.topics);
+  const auto told = [&](const std::string& unit, const std::optional<Shown>* gain, double stated) -> std::string {
+    if (!gain) return "";
+    if (!*gain) return "cannot be told";
+    return formatted("%.3g %s (%.3g to %.3g), %+.0f %%", (*gain)->value, unit.c_str(), (*gain)->low, (*gain)->high,
+                     100 * ((*gain)->value / stated - 1));
+  };
+  const auto *p_xy = &gains.position[0], *p_z = &gains.position[1], *v_xy = &gains.velocity[0],
+             *v_z = &gains.velocity[1];
+  const struct {
+    const std::optional<Shown>* shown;
+    const char *name, *unit;
+  } kStated[] = {
+      {p_xy, "MPC_XY_P", "1/s"},         {v_xy, "MPC_XY_VEL_P_ACC", "1/s"}, {nullptr, "MPC_XY_VEL_I_ACC", "1/s²"},
+      {p_z, "MPC_Z_P", "1/s"},           {v_z, "MPC_Z_VEL_P_ACC", "1/s"},   {nullptr, "THR_MDL_FAC", ""},
+      {nullptr, "MPC_TILTMAX_AIR", "°"}, {nullptr, "EKF2_EV_DELAY", "ms"},  {p_xy, "PSC_POSXY_P", "1/s"},
+      {v_xy, "PSC_VELXY_P", "1/s"},      {p_z, "PSC_POSZ_P", "1/s"},        {v_z, "PSC_VELZ_P", "1/s"},
+      {p_xy, "PSC_NE_POS_P", "1/s"},     {v_xy, "PSC_NE_VEL_P", "1/s"},     {p_z, "PSC_D_POS_P", "1/s"},
+      {v_z, "PSC_D_VEL_P", "1/s"},       {nullptr, "ANGLE_MAX", "0.01°"},   {nullptr, "MOT_THST_EXPO", ""},
+      {nullptr, "VISO_DELAY_MS", "ms"},  {nullptr, "ATC_INPUT_TC", "s"}};
+  for (const auto& [gain, name, unit] : kStated)
+    if (const auto found = p.find(name); found != p.end())
+      rows.push_back({name, formatted("%.4g %s", found->second, unit), told(unit, gain, found->second)});
   if (p.empty()) rows.push_back({"parameters", "none in this log", ""});
   return rows;
 }
@@ -170,11 +196,18 @@ std::string page_of(const LoggedVehicle& logged, const std::vector<std::string>&
     for (const auto& [low, high, rms] : vibration->bands)
       rows += report::row(formatted("%.0f to %.0f", low, high), formatted("%.3g", rms[0]), formatted("%.3g", rms[1]),
                           formatted("%.3g", rms[2]));
+    report::Chart chart{{"frequency, Hz"}, {"(m/s²)²/Hz"}};
+    chart.x.logarithmic = chart.y.logarithmic = true;
+    for (const auto& [axis, kind] :
+         {std::pair{0, report::Kind::flown}, {1, report::Kind::commanded}, {2, report::Kind::measured}})
+      chart.layers.push_back({report::Shape::line, kind, std::string("along ") + "xyz" [axis], {
+                                vibration->density[static_cast<std::size_t>(axis)]
+                              }});
     body +=
         report::section("Vibration",
                         report::escaped(formatted("Root mean square by octave, of %s at %.0f Hz; most at %.0f Hz.",
                                                   vibration->topic.c_str(), vibration->rate_hz, vibration->peak_hz)),
-                        report::table(rows, true));
+                        report::to_svg(chart) + report::table(rows, true));
   }
   return report::html_page(logged.path, body);
 }
@@ -193,10 +226,13 @@ int report_of_autopilots_log(const std::string& path, const std::string& vehicle
       flown.high_m)};
   first.insert(first.end(), logged.flight.notes.begin(), logged.flight.notes.end());
   if (!vehicle.empty())
-    if (const auto other = another_vehicle(logged, read_vehicle(vehicle)); !other.empty()) first.push_back(other);
+    if (const auto other = another_vehicle(logged.flight, read_vehicle(vehicle)); !other.empty())
+      first.push_back(other);
   const auto loop = loop_rows(logged);
   const auto vibration = vibration_of(logged.topics);
   const auto questions = questions_of(logged, flown);
+  const auto open = std::ranges::find_if(questions, [](const auto& q) { return !q.without.empty(); });
+  if (open != questions.end()) first.push_back("next flight, for " + open->asks + ": " + open->without);
   if (!out.empty()) write_file(out, page_of(logged, first, loop, vibration, questions), force);
   if (json) {
     Json all = {{"log", path},
@@ -206,10 +242,18 @@ int report_of_autopilots_log(const std::string& path, const std::string& vehicle
                 {"length_m", flown.length_m},
                 {"hover", nullptr},
                 {"attitude_lag", nullptr},
+                {"gains", nullptr},
                 {"vibration", Json::array()},
                 {"questions", Json::array()}};
     const auto shown = [](const Shown& s) { return Json{{"value", s.value}, {"low", s.low}, {"high", s.high}}; };
     if (logged.hover) all["hover"] = shown(*logged.hover);
+    const auto both = [&](const std::array<std::optional<Shown>, 2>& gains) {
+      Json told = Json::array();
+      for (const auto& gain : gains) told.push_back(gain ? shown(*gain) : Json(nullptr));
+      return told;
+    };
+    const auto gains = shown_gains(logged.topics);
+    all["gains"] = {{"position", both(gains.position)}, {"velocity", both(gains.velocity)}};
     if (logged.attitude_lag) all["attitude_lag"] = shown(*logged.attitude_lag);
     if (vibration)
       for (const auto& [low, high, rms] : vibration->bands)

@@ -14,6 +14,7 @@
 #include "core/study/windows/observer.hpp"
 #include "core/study/windows/signals/same_gusts.hpp"
 #include "services/backwash/files.hpp"
+#include "services/backwash/plan/logged_vehicle.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
@@ -55,6 +56,8 @@ log::FlightLog read_flight(const std::string& path) {
 log::FlightLog read_told(const std::string& path, LogNotes& notes) {
   auto log = read_flight(path);
   for (const auto& what : log.notes) notes.column(path, what);
+  if (is_autopilots_log(path) || log.t_s.size() < 2) return log;
+  if (const auto turned = log::turned_axes(log); !turned.empty()) throw Failure(kBadData, path + ":1: " + turned);
   return log;
 }
 
@@ -93,6 +96,7 @@ StudiedFlight look_at(const std::string& path, std::size_t room, const std::stri
                       std::vector<log::FlightLog>* keep) {
   progress("reading " + path);
   auto log = read_studied(path, with.notes);
+  if (const auto other = another_vehicle(log, with.vehicle); !other.empty()) with.notes.column(path, other);
   if (!group.empty() && (!log.has(group) || log.column(group).empty()))
     throw Failure(kBadData, path + ":1: no column '" + group + "' to group flights by; name one that it has");
   Room& in = with.rooms[room];

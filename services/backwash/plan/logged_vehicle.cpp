@@ -30,10 +30,17 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(at)];
 }
 
+/// What a log says of its hover.
+struct Hovered {
+  std::optional<Shown> thrust;
+  std::size_t windows = 0;  ///< slower than kStill
+  double airborne_s = 0;
+};
+
 /// Thrust and speed of windows one behind another. Those that hold kInTheAir of the strongest are in the air.
-void look_at_hover(LoggedVehicle& logged) {
-  const auto& log = logged.flight;
-  if (!log.has("thrust") || !log.has("vz_mps")) return;
+Hovered hovered(const log::FlightLog& log) {
+  Hovered all;
+  if (!log.has("thrust") || !log::has_xyz(log, "v", "_mps")) return all;
   struct Window {
     double u, weight;  ///< mean thrust; that without what the climb's change took
     double speed;      ///< largest
@@ -58,12 +65,13 @@ void look_at_hover(LoggedVehicle& logged) {
   std::vector<double> hover;
   for (const auto& w : windows) {
     if (w.u < kInTheAir * most) continue;
-    logged.airborne_s += kWindow;
-    logged.hover_windows += w.speed < kStill ? 1 : 0;
+    all.airborne_s += kWindow;
+    all.windows += w.speed < kStill ? 1 : 0;
     if (w.speed < kSlow) hover.push_back(w.weight);
   }
   if (hover.size() >= 3 && most > 0)
-    logged.hover = Shown{quantile(hover, 0.5), quantile(hover, 0.05), quantile(hover, 0.95)};
+    all.thrust = Shown{quantile(hover, 0.5), quantile(hover, 0.05), quantile(hover, 0.95)};
+  return all;
 }
 
 /// Where a body's z axis points, along the first two axes of the world.
@@ -124,7 +132,10 @@ LoggedVehicle logged_vehicle(const std::string& path) {
   auto flight = log::flight_of(logged.topics);
   if (!flight) throw Failure(kBadData, path + ":1: " + flight.error());
   logged.flight = std::move(*flight);
-  look_at_hover(logged);
+  const auto hover = hovered(logged.flight);
+  logged.hover = hover.thrust;
+  logged.hover_windows = hover.windows;
+  logged.airborne_s = hover.airborne_s;
   look_at_attitude(logged);
   return logged;
 }
@@ -208,13 +219,12 @@ std::vector<SourcedValue> sourced_values(const LoggedVehicle& logged) {
   return values;
 }
 
-std::string another_vehicle(const LoggedVehicle& logged, const Vehicle& vehicle) {
+std::string another_vehicle(const log::FlightLog& log, const Vehicle& vehicle) {
   constexpr double kMostApart = 1.25;  // a battery's fall and a payload are less
   const double file = hover_command(vehicle);
-  if (!logged.hover) return {};
-  const double apart = std::max(file / logged.hover->value, logged.hover->value / file);
-  if (apart < kMostApart) return {};
-  return formatted("this log hovers at %.2f, the vehicle file says %.2f: another vehicle", logged.hover->value, file);
+  const auto hover = hovered(log).thrust;
+  if (!hover || std::max(file / hover->value, hover->value / file) < kMostApart) return {};
+  return formatted("this log hovers at %.2f, the vehicle file says %.2f: another vehicle", hover->value, file);
 }
 
 namespace {

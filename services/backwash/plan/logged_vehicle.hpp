@@ -43,7 +43,7 @@ std::vector<SourcedValue> sourced_values(const LoggedVehicle& logged);
 std::optional<std::pair<std::string, double>> stated_hover(const std::map<std::string, double>& parameters);
 
 /// What the hover of a log contradicts in a vehicle file, a sentence; empty: nothing, or the log does not hover.
-std::string another_vehicle(const LoggedVehicle& logged, const Vehicle& vehicle);
+std::string another_vehicle(const log::FlightLog& log, const Vehicle& vehicle);
 
 /// `vehicle from`: a vehicle file from one log.
 Verb vehicle_from_verb(Command& group);

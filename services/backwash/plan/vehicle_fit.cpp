@@ -10,6 +10,7 @@
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
 #include "services/backwash/learn/study_flights.hpp"
+#include "services/backwash/plan/logged_vehicle.hpp"
 #include "version.hpp"
 
 namespace backwash::services {
@@ -139,6 +140,7 @@ int fit_vehicle(const VehicleFitOptions& options) {
   each_readable(options.logs, notes, [&](const std::string& path) {
     progress("reading " + path);
     auto log = read_studied(path, notes);
+    if (const auto other = another_vehicle(log, vehicle); !other.empty()) notes.column(path, other);
     if (const auto same = known.again(path, log::FlightMark(log)); !same.empty()) throw Failure(kBadData, same);
     logs.push_back(std::move(log));
     named.push_back({path, &logs.back()});

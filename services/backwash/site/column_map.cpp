@@ -13,6 +13,7 @@
 
 #include "core/config/strict_table.hpp"
 #include "core/log/columns/median.hpp"
+#include "core/log/columns/table_rows.hpp"
 
 namespace backwash::services {
 namespace {
@@ -44,26 +45,23 @@ struct Known {
 };
 const std::vector<Known>& known() {
   static const std::vector<Known> all{
-      {"t_s",
-       {"t_s", "t", "time", "timestamp", "time_s", "timestamp_us", "time_us", "stamp", "time_ms", "timestamp_ns",
-        "frame/rate"}},
+      {"t_s", {"t", "time", "timestamp", "stamp", "frame/rate"}},
       {"%_m",
-       {"%_m", "p%", "pos_%", "position_%", "position.%", "%", "stateestimate.%", "est_stateestimate_%", "pn%", "t%",
+       {"p%", "pos_%", "position_%", "position.%", "%", "stateestimate.%", "est_stateestimate_%", "pn%", "t%",
         "position %", "%_pos", "pose.position.%", "pose.pose.position.%"}},
-      {"v%_mps",
-       {"v%_mps", "v%", "vel_%", "velocity_%", "velocity.%", "stateestimate.v%", "est_stateestimate_v%", "velocity %"}},
-      {"acceleration_%", {"a%_mps2", "a%", "acc_%", "accel_%", "acc.%", "imu_acc_%", "acceleration_%", "a%_g", "acc%"}},
+      {"v%_mps", {"v%", "vel_%", "velocity_%", "velocity.%", "stateestimate.v%", "est_stateestimate_v%", "velocity %"}},
+      {"acceleration_%", {"a%", "acc_%", "accel_%", "acc.%", "imu_acc_%", "acceleration_%", "acc%"}},
       {"q%",
        {"q%", "quat_%", "orientation_%", "orientation.%", "q_%", "stateestimate.q%", "rotation %", "pose.orientation.%",
         "pose.pose.orientation.%"}},
-      {"roll", {"roll", "roll_deg", "roll_rad", "stabilizer.roll"}},
-      {"pitch", {"pitch", "pitch_deg", "pitch_rad", "stabilizer.pitch"}},
-      {"yaw", {"yaw", "yaw_deg", "yaw_rad", "stabilizer.yaw"}},
-      {"cmd_%_m", {"cmd_%_m", "sp_%", "setpoint_%", "des_%", "ref_%", "ctrltarget.%", "sp_ctrltarget_%"}},
+      {"roll", {"roll", "stabilizer.roll"}},
+      {"pitch", {"pitch", "stabilizer.pitch"}},
+      {"yaw", {"yaw", "stabilizer.yaw"}},
+      {"cmd_%_m", {"cmd_%", "sp_%", "setpoint_%", "des_%", "ref_%", "ctrltarget.%", "sp_ctrltarget_%"}},
       {"thrust", {"thrust", "cmd_thrust", "controller.cmd_thrust", "pid_controller_cmd_thrust"}},
       {"motor#", {"motor#", "m#", "motor_m#", "motor.m#", "motor_motor_m#", "pwm#"}},
-      {"rpm#", {"rpm#", "rpm_#", "rotor#_rpm"}},
-      {"battery_v", {"battery_v", "vbat", "battery_mv", "voltage", "pm.vbat", "pwr_pm_vbat"}}};
+      {"rpm#", {"rpm#", "rpm_#", "rotor#"}},
+      {"battery_v", {"battery_v", "vbat", "voltage", "pm.vbat", "pwr_pm_vbat"}}};
   return all;
 }
 
@@ -74,7 +72,8 @@ std::string filled(std::string pattern, char with) {
   return pattern;
 }
 
-/// The words of a name, lower case; "Position X" and "p_RS_R_x" have the quantity first and the axis last.
+/// The words of a name but for its unit, lower case; "Position X" and "p_RS_R_x" have the quantity first and the axis
+/// last.
 std::vector<std::string> words(const std::string& name) {
   std::vector<std::string> all(1);
   for (const char c : lower(name)) {
@@ -85,29 +84,35 @@ std::vector<std::string> words(const std::string& name) {
     }
   }
   if (all.back().empty()) all.pop_back();
+  if (all.size() > 1 && !log::unit_in_name(name).empty()) all.pop_back();
   return all;
 }
 
-/// A column that is called so; else one whose name ends so, after an object's; else one with names of frames between
-/// the quantity and the axis. The first of each; none whose name is there twice.
+/// A column that is called so, whatever unit its name ends with; else one whose name ends so, after an object's; else
+/// one with names of frames between the quantity and the axis; else the axis after the name of the only object. The
+/// first of each; none whose name is there twice.
 std::optional<std::string> called(const log::ForeignTable& table, const std::vector<const char*>& names, char with) {
-  using Fits = bool (*)(const std::string& column, const std::string& name);
-  constexpr Fits kFits[] = {[](const std::string& column, const std::string& name) {
-                              return lower(column) == name || lower(column) == "#" + name;
-                            },
-                            [](const std::string& column, const std::string& name) {
-                              const auto have = words(column), want = words(name);
-                              return !name.empty() && name.size() > 1 && have.size() > want.size() &&
-                                     std::ranges::equal(std::span(have).last(want.size()), want);
-                            },
-                            [](const std::string& column, const std::string& name) {
-                              const auto have = words(column);
-                              return have.size() > 2 && have.front() + have.back() == name;
-                            }};
-  for (const Fits fits : kFits)
+  using Fits = bool (*)(const std::vector<std::string>& column, const std::vector<std::string>& name);
+  constexpr Fits kFits[] = {
+      [](const auto& have, const auto& want) { return have == want; },
+      [](const auto& have, const auto& want) {
+        return (want.size() > 1 || want[0].size() > 1) && have.size() > want.size() &&
+               std::ranges::equal(std::span(have).last(want.size()), want);
+      },
+      [](const auto& have, const auto& want) {
+        return want.size() == 1 && have.size() > 2 && have.front() + have.back() == want[0];
+      },
+      [](const auto& have, const auto& want) { return want.size() == 1 && have.size() > 1 && have.back() == want[0]; }};
+  for (const Fits fits : kFits) {
+    std::vector<std::string> found;
     for (const char* name : names)
-      for (const auto& column : table.columns)
-        if (!table.find(column.name + " (2)") && fits(column.name, filled(name, with))) return column.name;
+      for (const auto& column : table.columns) {
+        const auto have = words(column.name);
+        if (!have.empty() && !table.find(column.name + " (2)") && fits(have, words(filled(name, with))))
+          found.push_back(column.name);
+      }
+    if (!found.empty() && (fits != std::end(kFits)[-1] || found.size() == 1)) return found.front();
+  }
   return std::nullopt;
 }
 
@@ -127,6 +132,9 @@ std::map<std::string, std::string> guessed(const log::ForeignTable& header) {
       if (const auto column = called(header, theirs, c)) whole[filled(name, c)] = *column;
     if (whole.size() == over.size()) found.insert(whole.begin(), whole.end());
   }
+  if (const auto dated = std::ranges::find_if(header.columns, &log::ForeignTable::Column::dates);
+      dated != header.columns.end())
+    found["t_s"] = dated->name;
   if (found.contains("qw"))
     for (const char* angle : {"roll", "pitch", "yaw"}) found.erase(angle);
   if (!found.contains("roll") || !found.contains("pitch") || !found.contains("yaw"))
@@ -139,6 +147,7 @@ std::map<std::string, std::string> guessed(const log::ForeignTable& header) {
 std::string unit_of(const std::string& ours, const log::ForeignTable::Column& theirs) {
   if (!theirs.unit.empty() && log::unit_factor(ours, theirs.unit)) return theirs.unit;
   if (ours == "t_s") {
+    if (theirs.dates) return "s";
     std::vector<double> steps;
     for (std::size_t i = 1; i < theirs.values.size(); ++i)
       if (const double step = theirs.values[i] - theirs.values[i - 1]; step > 0) steps.push_back(step);
@@ -151,16 +160,16 @@ std::string unit_of(const std::string& ours, const log::ForeignTable::Column& th
     if (std::isfinite(value)) most = std::max(most, std::abs(value));
   if (ours == "thrust" || ours.starts_with("motor")) return most <= 1.2 ? "1" : most <= 100 ? "percent" : "u16";
   if (ours == "battery_v") return most > 100 ? "mV" : "V";
-  if (ours == "roll" || ours == "pitch" || ours == "yaw")
-    return most > 6.4 || lower(theirs.name).ends_with("deg") ? "deg" : "rad";
+  if (ours == "roll" || ours == "pitch" || ours == "yaw") return most > 6.4 ? "deg" : "rad";
   return "";
 }
 
-std::string written(const ColumnMap& map, const std::vector<std::string>& doubts, bool told) {
+std::string written(const ColumnMap& map, const std::vector<std::string>& doubts, bool bare) {
   std::string text = "# A guess from the names of the columns";
-  text += doubts.empty() ? ", and nothing in the numbers contradicts it.\n" : ". The numbers contradict it:\n";
+  text += doubts.empty() ? ", and nothing in the numbers contradicts it.\n" : ". Import refuses it as it stands:\n";
   for (const auto& doubt : doubts) text += "#   " + doubt + "\n";
-  if (!told) text += "# Which axes are up the flight does not tell: [frame] is a guess; check it.\n";
+  if (bare)
+    text += "# Without a header the attitude is taken as TUM's, scalar last; else: --columns t,x,y,z,qw,qx,qy,qz\n";
   text += "[frame]\n";
   if (map.world) text += "world = \"" + log::called(*map.world, log::named_worlds()) + "\"\n";
   if (map.body) text += "body = \"" + log::called(*map.body, log::named_bodies()) + "\"\n";
@@ -175,47 +184,41 @@ std::string written(const ColumnMap& map, const std::vector<std::string>& doubts
   return text;
 }
 
-/// What a table without a header holds, or one that the user names: his names, "-" for what is left out; else those of
-/// the trajectories of TUM, which eight columns with a unit quaternion at the end are.
-tl::expected<std::vector<std::string>, std::string> titles_of(const log::ForeignTable& table,
-                                                              const std::string& names) {
-  std::vector<std::string> titles;
-  for (const auto& column : table.columns) titles.push_back(column.name);
-  if (!names.empty()) {
-    std::vector<std::string> given(1);
-    for (const char c : names) {
-      if (c == ',') given.emplace_back();
-      if (c != ',' && c != ' ') given.back() += c;
-    }
-    if (given.size() != titles.size())
-      return tl::make_unexpected("--columns names " + std::to_string(given.size()) + " columns, the table has " +
-                                 std::to_string(titles.size()) + "; name each, - for one to leave out");
-    return given;
-  }
-  constexpr std::array kTum{"t", "tx", "ty", "tz", "qx", "qy", "qz", "qw"};
-  if (table.named || titles.size() != kTum.size()) return titles;
+/// Whether four columns in a row, from `first` on, are unit quaternions.
+bool unit_from(const log::ForeignTable& table, std::size_t first) {
   for (std::size_t row = 0; row < table.columns[0].values.size(); ++row) {
     double square = 0;
-    for (std::size_t c = 4; c < kTum.size(); ++c) square += std::pow(table.columns[c].values[row], 2);
-    if (std::abs(square - 1) > 0.02) return titles;
+    for (std::size_t c = first; c < first + 4; ++c) square += std::pow(table.columns[c].values[row], 2);
+    if (std::abs(square - 1) > 0.02) return false;
   }
-  return std::vector<std::string>(kTum.begin(), kTum.end());
+  return true;
 }
 
-/// The turns of world and body to try: what the numbers say; else the named ones, or none of a world that only its user
-/// knows.
-std::vector<std::pair<std::optional<log::Turn>, std::optional<log::Turn>>> turns_for(const log::FlightLog& theirs) {
-  if (const auto up = log::up_axes(theirs)) return {{log::upright_world(up->world), log::upright_body(up->body)}};
-  if (log::flat_height(theirs)) return {{std::nullopt, std::nullopt}};
-  std::vector<std::pair<std::optional<log::Turn>, std::optional<log::Turn>>> all;
-  for (const auto& world : log::named_worlds()) {
-    if (const auto body = log::body_up(theirs, world.turn.transpose() * Vec3::UnitZ())) {
-      all.emplace_back(world.turn, log::upright_body(*body));
-      continue;
-    }
-    for (const auto& body : log::named_bodies()) all.emplace_back(world.turn, body.turn);
+/// The columns of the trajectories of TUM, which eight without a header are that end with a unit quaternion.
+constexpr std::array kTum{"t", "tx", "ty", "tz", "qx", "qy", "qz", "qw"};
+bool is_tum(const log::ForeignTable& table) {
+  return !table.named && table.columns.size() == kTum.size() && unit_from(table, 4);
+}
+
+/// What a table without a header holds, or one that the user names: his names, "-" for what is left out; else TUM's.
+tl::expected<std::vector<std::string>, std::string> titles_of(const log::ForeignTable& table,
+                                                              const std::string& names) {
+  constexpr std::size_t kKitti = 12;
+  std::vector<std::string> titles, given(1);
+  for (const auto& column : table.columns) titles.push_back(column.name);
+  for (const char c : names) {
+    if (c == ',') given.emplace_back();
+    if (c != ',' && c != ' ') given.back() += c;
   }
-  return all;
+  if (!names.empty() && given.size() == titles.size()) return given;
+  if (!names.empty())
+    return tl::make_unexpected("--columns names " + std::to_string(given.size()) + " columns, the table has " +
+                               std::to_string(titles.size()) + "; name each, - for one to leave out");
+  if (!table.named && titles.size() == kKitti)
+    return tl::make_unexpected(
+        "twelve columns without a header are poses as KITTI has them, without times: paste -d' ' times.txt FILE > "
+        "flight.txt, and name its columns by --columns t,-,-,-,x,-,-,-,y,-,-,-,z");
+  return is_tum(table) ? std::vector<std::string>(kTum.begin(), kTum.end()) : titles;
 }
 
 }  // namespace
@@ -226,7 +229,8 @@ tl::expected<ColumnMap, config::ConfigError> read_column_map(const std::string& 
   std::vector<std::string> paths;
   for (const auto& name : log::mappable_columns()) paths.push_back("columns." + name);
   std::vector<config::Key> allowed;
-  for (const std::string_view key : {"frame.world", "frame.body"}) allowed.push_back(config::read_elsewhere(key));
+  for (const std::string_view key : {"frame.world", "frame.body", "frame.attitude"})
+    allowed.push_back(config::read_elsewhere(key));
   for (const auto& column : paths) allowed.push_back(config::read_elsewhere(column));
   if (auto read = table->read(allowed); !read) return tl::make_unexpected(read.error());
   ColumnMap map;
@@ -241,6 +245,13 @@ tl::expected<ColumnMap, config::ConfigError> read_column_map(const std::string& 
       return tl::make_unexpected(
           table->error(key, std::string("is '") + names->front().name + "', '" + names->back().name +
                                 "', or our x, y and z in theirs, right-handed, as 'x, -z, y' where y is up"));
+  }
+  if (table->has("frame.attitude")) {
+    const auto text = table->text("frame.attitude");
+    if (!text) return tl::make_unexpected(text.error());
+    map.world_to_body = *text == "world to body";
+    if (!map.world_to_body && *text != "body to world")
+      return tl::make_unexpected(table->error("frame.attitude", "is 'body to world' or 'world to body'"));
   }
   for (const auto& name : log::mappable_columns()) {
     const std::string key = "columns." + name;
@@ -274,6 +285,7 @@ tl::expected<std::string, log::LogError> proposed_column_map(const std::string& 
   };
   const auto titles = titles_of(*table, names);
   if (!titles) return bad(titles.error());
+  const bool bare = names.empty() && is_tum(*table);
   log::ForeignTable titled = *table;
   for (std::size_t i = 0; i < titles->size(); ++i) titled.columns[i].name = (*titles)[i];
   auto found = guessed(titled);
@@ -290,38 +302,44 @@ tl::expected<std::string, log::LogError> proposed_column_map(const std::string& 
   const bool turned = found.contains("qw") || found.contains("roll");
   std::vector<std::array<std::string, 2>> kinds{{"", ""}};  // of acceleration: ours, unit
   if (found.contains("acceleration_x")) {
-    kinds = {{"a%_mps2", "m/s2"}, {"a%_mps2", "g"}};
-    if (turned) kinds.insert(kinds.begin(), {{"specific_force_%", "m/s2"}, {"specific_force_%", "g"}});
+    const std::string stated = table->find(found.at("acceleration_x"))->unit;
+    const bool known = log::unit_factor("ax_mps2", stated) && !stated.empty();
+    kinds.clear();
+    for (const std::string kind : {"specific_force_%", "a%_mps2"})
+      for (const std::string unit : {"m/s2", "g"})
+        if ((turned || kind != "specific_force_%") && (!known || unit == "g"))
+          kinds.push_back({kind, known ? stated : unit});
   }
   ColumnMap best;
   std::optional<std::vector<std::string>> doubts;
-  bool told = false;
   for (const auto& [kind, unit] : kinds) {
     ColumnMap map = base;
     for (const char c : std::string(kind.empty() ? "" : "xyz"))
       map.columns[filled(kind, c)] = {found.at(std::string("acceleration_") + c), unit};
     const auto theirs = log::in_their_axes(*table, path, map);
-    if (!theirs) {
-      if (!doubts) best = map, doubts = {theirs.error().message};
-      continue;
+    std::vector<std::string> wrong;
+    if (theirs) {
+      const auto readings = log::axes_readings(*theirs);
+      if (readings.size() == 1 && readings.front().keys.empty()) {
+        map.world = log::upright_world(readings.front().up.world);
+        map.body = log::upright_body(readings.front().up.body);
+      }
+      wrong.push_back(log::wrong_axes(*theirs, map));
+    } else {
+      wrong.push_back(theirs.error().message);
     }
-    told = told || log::up_axes(*theirs);
-    for (const auto& [world, body] : turns_for(*theirs)) {
-      map.world = world;
-      map.body = body;
+    if (theirs) {
       const auto flight = log::in_our_axes(*theirs, map);
-      std::vector<std::string> wrong;
       if (!flight) wrong.push_back(flight.error());
       if (flight)
         for (const auto& doubt : log::contradictions(*flight)) wrong.push_back(doubt.words);
-      if (!world) wrong.push_back(log::flat_height(*theirs)->first + ": say which axis is up by frame.world");
-      if (!doubts || wrong.size() < doubts->size()) {
-        best = map;
-        doubts = wrong;
-      }
     }
+    std::erase(wrong, "");
+    if (doubts && wrong.size() >= doubts->size()) continue;
+    best = map;
+    doubts = wrong;
   }
-  return written(best, *doubts, told);
+  return written(best, *doubts, bare);
 }
 
 }  // namespace backwash::services
