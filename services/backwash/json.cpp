@@ -60,9 +60,57 @@ Json to_json(const plan::Region& r) {
           {"widest", {{"p", to_json(r.widest_W)}, {"clearance_m", r.widest_clearance_m}}}};
 }
 
+Json to_json(const plan::Plan& plan, reach::Method method, bool stated) {
+  Json trajectory = Json::array();
+  for (std::size_t k = 0; k < plan.commands.size(); ++k) {
+    const auto& c = plan.commands[k];
+    trajectory.push_back({{"t", static_cast<double>(k) * kControlPeriod},
+                          {"p", to_json(c.p_W)},
+                          {"v", to_json(c.v_W)},
+                          {"a", to_json(c.a_W)},
+                          {"yaw", c.yaw}});
+  }
+  Json metrics = to_json(plan.metrics);
+  const auto& risk = plan.metrics.risk;
+  if (stated && plan.status == plan::PlanStatus::ok)
+    metrics["risk"] = {{"total", risk.total}, {"a_minute", risk.a_minute}};
+  if (risk.largest > 0)
+    metrics["risk"].update({{"worst_second", risk.largest},
+                            {"t", risk.t},
+                            {"p", to_json(risk.center_W)},
+                            {"clearance_m", risk.clearance},
+                            {"sigma_m", risk.sigma}});
+  return {{"status", plan::to_string(plan.status)},
+          {"message", plan.message},
+          {"metrics", std::move(metrics)},
+          {"trajectory", std::move(trajectory)},
+          {"tube", to_json(plan.tube, method)}};
+}
+
+namespace {
+std::string* taken = nullptr;  // what is printed goes there
+}
+
 void print(const Json& json) {
   // A file's name may be no UTF-8; JSON is.
-  std::printf("%s\n", json.dump(-1, ' ', false, Json::error_handler_t::replace).c_str());
+  const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (taken)
+    *taken = text;
+  else
+    std::printf("%s\n", text.c_str());
+}
+
+std::string printed_by(const std::function<void()>& work) {
+  std::string text;
+  taken = &text;
+  try {
+    work();
+  } catch (...) {
+    taken = nullptr;
+    if (text.empty()) throw;
+  }
+  taken = nullptr;
+  return text;
 }
 
 }  // namespace backwash::services

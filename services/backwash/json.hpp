@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "core/plan/feasibility.hpp"
 #include "core/plan/planner.hpp"
@@ -22,13 +24,18 @@ Json symmetric_to_json(const Mat3& shape);
 /// Steps of a tube; `shape` only where the method is paper. With a direction, `support` along it, m.
 Json to_json(const reach::ReachTube& tube, reach::Method method, const std::optional<Vec3>& direction = std::nullopt);
 Json to_json(const plan::PlanMetrics& metrics);
+/// `stated`: a risk was, in place of the worst case.
+Json to_json(const plan::Plan& plan, reach::Method method, bool stated);
 Json to_json(const plan::Region& region);
 
 /// Support of a step's set along a unit direction, m: √(nᵀ Q n) for paper; for tight the octagonal prism's, exact along
 /// the five directions and an upper bound between them.
 double support(const reach::TubeStep& step, reach::Method method, const Vec3& direction);
 
-/// Prints one JSON object and a newline on stdout.
+/// Prints one JSON object and a newline on stdout, or leaves it to who called printed_by().
 void print(const Json& json);
+/// The text that `work` prints, without the newline; empty: none. What it throws passes where it printed nothing. Not
+/// for two threads at once.
+std::string printed_by(const std::function<void()>& work);
 
 }  // namespace backwash::services

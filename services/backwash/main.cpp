@@ -41,8 +41,7 @@ int main(int argc, char** argv) {
     ::execv(program(std::string(verb)).c_str(), argv);
     if (argc < 3 || std::string_view(argv[2]) != "--help") argc = 2;  // its options are that program's
   }
-  return run_tool(argc, argv,
-                  {fly_verb, plan_verb, reach_verb, field_verb, simulate_verb, feasibility_verb, compare_verb,
-                   report_verb, calibrate_verb, import_verb, replay_verb, export_verb, merge_verb, study_verb,
-                   adapt_verb, vehicle_verb, map_verb, campaign_verb, keys_verb});
+  auto verbs = verbs_of_one_process();
+  verbs.insert(verbs.end(), {campaign_verb, keys_verb, feasibility_verb, compare_verb});
+  return run_tool(argc, argv, verbs);
 }

@@ -225,10 +225,7 @@ const Command* Command::begun() const {
 
 std::string Command::line() const { return name() + (begun() ? " " + begun()->line() : ""); }
 
-int Command::usage(const std::string& what) const {
-  say_error(line(), what + "; see " + line() + " --help");
-  return kUsage;
-}
+void Command::refuse(const std::string& what) const { throw UsageError(what + "; see " + line() + " --help"); }
 
 /// What to say where none of the verbs was begun.
 std::string Command::no_verb() const {
@@ -262,22 +259,41 @@ std::string Command::not_taken() const {
   return "there is no option '" + said + "'" + (meant.empty() ? "" : ", did you mean " + meant + "?");
 }
 
-std::optional<int> Command::parse(int argc, const char* const* argv) {
+void Command::take(int argc, const char* const* argv) {
   try {
     app_->parse(argc, argv);
-    return std::nullopt;
   } catch (const CLI::Success& help_or_version) {
-    return finished(app_->exit(help_or_version), name());
+    throw;
   } catch (const CLI::ParseError& wrong) {
-    if (std::string_view(wrong.what()) == "A subcommand is required") return usage(no_verb());
+    if (std::string_view(wrong.what()) == "A subcommand is required") refuse(no_verb());
     // An argument that nobody takes is told before what is missing: it may be that, misspelt.
     const bool misspelt = dynamic_cast<const CLI::RequiredError*>(&wrong) ||
                           dynamic_cast<const CLI::ExtrasError*>(&wrong) ||
                           dynamic_cast<const CLI::ArgumentMismatch*>(&wrong);
     const std::string unknown = misspelt ? not_taken() : "";
-    return usage(unknown.empty() ? in_plain_words(wrong.what()) : unknown);
+    refuse(unknown.empty() ? in_plain_words(wrong.what()) : unknown);
   } catch (const UsageError& wrong) {
-    return usage(wrong.what());
+    refuse(wrong.what());
+  }
+}
+
+std::optional<int> Command::parse(int argc, const char* const* argv) {
+  try {
+    take(argc, argv);
+    return std::nullopt;
+  } catch (const CLI::Success& help_or_version) {
+    return finished(app_->exit(help_or_version), name());
+  } catch (const UsageError& wrong) {
+    say_error(line(), wrong.what());
+    return kUsage;
+  }
+}
+
+void Command::read(int argc, const char* const* argv) {
+  try {
+    take(argc, argv);
+  } catch (const CLI::Success& help_or_version) {
+    refuse("--help and --version are no question");
   }
 }
 

@@ -91,10 +91,15 @@ class Command {
   /// Without a value the program goes on. Otherwise it ends with it: 0 after --help and --version, 64 after a usage
   /// error, told on stderr as `PROGRAM VERB: what; see PROGRAM VERB --help`.
   std::optional<int> parse(int argc, const char* const* argv);
+  /// The same without a word on stderr. Throws UsageError, `what; see PROGRAM VERB --help`, also where the line asks
+  /// for
+  /// --help or --version.
+  void read(int argc, const char* const* argv);
 
  private:
   explicit Command(CLI::App* app);
-  int usage(const std::string& what) const;
+  [[noreturn]] void refuse(const std::string& what) const;
+  void take(int argc, const char* const* argv);
   const Command* begun() const;  ///< the verb below it that the line names; null: none
   std::string no_verb() const;
   std::string not_taken() const;

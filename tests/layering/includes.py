@@ -55,6 +55,7 @@ MAY = {
     "services/bench": ["core/config", "core/sim", *FLIGHT, "firmware_bridge", "services/security", "services/dds",
                        "services/parallel", "services/command_line"],
     "services/backwash": ["core", "firmware_bridge/autopilots", "services/security", "services/maps", "services/parallel", "services/command_line"],
+    "services/python": ["core", "services/command_line", "services/backwash"],
     "services/package": ["core/config", *FLIGHT],  # the library's example
     "research": ["core", "services/backwash"],
 }

@@ -18,33 +18,6 @@ struct PlanOptions {
   bool json = false;
 };
 
-void print_json(const plan::Plan& plan, reach::Method method, bool stated) {
-  Json trajectory = Json::array();
-  for (std::size_t k = 0; k < plan.commands.size(); ++k) {
-    const auto& c = plan.commands[k];
-    trajectory.push_back({{"t", static_cast<double>(k) * kControlPeriod},
-                          {"p", services::to_json(c.p_W)},
-                          {"v", services::to_json(c.v_W)},
-                          {"a", services::to_json(c.a_W)},
-                          {"yaw", c.yaw}});
-  }
-  Json metrics = services::to_json(plan.metrics);
-  const auto& risk = plan.metrics.risk;
-  if (stated && plan.status == plan::PlanStatus::ok)
-    metrics["risk"] = {{"total", risk.total}, {"a_minute", risk.a_minute}};
-  if (risk.largest > 0)
-    metrics["risk"].update({{"worst_second", risk.largest},
-                            {"t", risk.t},
-                            {"p", services::to_json(risk.center_W)},
-                            {"clearance_m", risk.clearance},
-                            {"sigma_m", risk.sigma}});
-  print(Json{{"status", plan::to_string(plan.status)},
-             {"message", plan.message},
-             {"metrics", std::move(metrics)},
-             {"trajectory", std::move(trajectory)},
-             {"tube", services::to_json(plan.tube, method)}});
-}
-
 void print_text(const plan::Plan& plan, bool stated) {
   const auto& m = plan.metrics;
   std::printf("status         %s\n", plan::to_string(plan.status));
@@ -87,7 +60,7 @@ int run(const PlanOptions& options) {
   }
   if (world) progress("planning");
   const auto plan = world ? plan::plan(*world, start, *options.goal, limits) : *std::move(refused);
-  options.json ? print_json(plan, options.method, options.risk.has_value())
+  options.json ? print(to_json(plan, options.method, options.risk.has_value()))
                : print_text(plan, options.risk.has_value());
   if (plan.status == plan::PlanStatus::ok) return kOk;
   throw Failure(kUnavailable, options.map + ":1: " + plan::to_string(plan.status) + ": " + plan.message);

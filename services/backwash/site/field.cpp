@@ -6,13 +6,14 @@
 #include "core/report/figures.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
+#include "services/backwash/site/field_volume.hpp"
 #include "services/backwash/verb.hpp"
 
 namespace backwash::services {
 namespace {
 
 struct FieldOptions {
-  std::string map, model, vehicle, points, slice, out;
+  std::string map, model, vehicle, points, slice, volume, out;
   std::optional<Vec3> at;
   bool interpolated = false, json = false, force = false;
 };
@@ -186,11 +187,11 @@ void write_picture(const FieldOptions& options, const map::OccupancyGrid& grid, 
 }
 
 int run(const FieldOptions& options) {
-  if (options.points.empty() + options.slice.empty() + !options.at != 2) {
-    throw Failure(kUsage, "give exactly one of --points, --slice and --at");
+  if (options.points.empty() + options.slice.empty() + options.volume.empty() + !options.at != 3) {
+    throw Failure(kUsage, "give exactly one of --points, --slice, --volume and --at");
   }
   if (!options.out.empty() && options.slice.empty()) throw Failure(kUsage, "--out is a picture of a --slice; give one");
-  check_output(options.out, options.force);
+  check_outputs({options.out, options.volume}, options.force);
   if (!options.out.empty() && !options.out.ends_with(".svg") && !options.out.ends_with(".png"))
     throw Failure(kUsage, "--out " + options.out + " is no picture that can be drawn; name it .svg or .png");
   std::optional<report::Slice> slice;
@@ -199,6 +200,14 @@ int run(const FieldOptions& options) {
   auto model = read_model(options.model);
   if (!options.vehicle.empty()) model.ground.r0 = read_vehicle(options.vehicle).body.diagonal_radius;
 
+  if (!options.volume.empty()) {
+    progress("evaluating every free voxel");
+    write_npz(options.volume, options.force, grid, field_volume(grid, model));
+    const auto& size = grid.size();
+    options.json ? print(Json{{"volume", options.volume}, {"shape", {size.z(), size.y(), size.x(), 6}}})
+                 : static_cast<void>(std::printf("written: %s\n", options.volume.c_str()));
+    return kOk;
+  }
   std::vector<Vec3> points;
   if (options.at) {
     check_free(grid, *options.at, options.map);
@@ -227,11 +236,12 @@ Verb field_verb(Command& app) {
                      "vehicle file or builtin:NAME: its diagonal_radius takes r0's place");
   command.add_option("--points", options->points, "CSV with the columns x_m,y_m,z_m");
   command.add_option("--slice", options->slice, "plane, as in z=0.5: the free voxels it cuts");
+  command.add_option("--volume", options->volume, "file for numpy.load: every free voxel");
   add_point(command, "--at", options->at, "one point, m");
   command.add_flag("--interpolated", options->interpolated, "from the stored field instead of exactly (slices always)");
   command.add_option("--out", options->out, "picture of the slice, .svg or .png");
   command.add_flag("--json", options->json, "one JSON object on stdout");
-  command.add_flag("--force", options->force, "overwrite --out");
+  command.add_flag("--force", options->force, "overwrite --out and --volume");
   command.footer(
       "Example:\n  backwash field --map builtin:apartment --model builtin:quad-5in --slice z=1.0 --out slice.svg");
   return {&command, [options] { return run(*options); }};

@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <span>
 #include <vector>
 
 #include "core/field/lateral/vector_levels.hpp"
@@ -29,12 +30,16 @@ constexpr std::uintmax_t kMostBytes = std::uintmax_t{1} << 30;  // of the folder
 constexpr std::string_view kMagic = "backwash world 1\n";
 constexpr std::size_t kDigits = 64;  // of a hash
 
-/// The hash that the linker made of this program; empty if it made none.
+/// The hash that the linker made of this program, or of the library that this is in; empty if it made none.
 std::string build_id() {
   std::string id;
   const auto of_program = [](dl_phdr_info* info, std::size_t, void* found) {
-    for (int n = 0; n < info->dlpi_phnum; ++n) {
-      const auto& part = info->dlpi_phdr[n];
+    const auto parts = std::span(info->dlpi_phdr, info->dlpi_phnum);
+    const auto here = reinterpret_cast<ElfW(Addr)>(&build_id) - info->dlpi_addr;
+    if (std::ranges::none_of(
+            parts, [&](const auto& part) { return part.p_type == PT_LOAD && here - part.p_vaddr < part.p_memsz; }))
+      return 0;  // another object
+    for (const auto& part : parts) {
       if (part.p_type != PT_NOTE) continue;
       const char* note = reinterpret_cast<const char*>(info->dlpi_addr + part.p_vaddr);
       for (const char* const end = note + part.p_memsz; note + sizeof(ElfW(Nhdr)) <= end;) {
@@ -48,7 +53,7 @@ std::string build_id() {
         note = content + padded(header.n_descsz);
       }
     }
-    return 1;  // the program itself is the first object
+    return 1;
   };
   ::dl_iterate_phdr(of_program, &id);
   return id;
