@@ -99,6 +99,7 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
   result.metrics.expanded = path->expanded;
 
   Refinement refined = refine(world, path->motions, start, goal_W, options, deadline);
+  result.metrics.tubes_ms = refined.tubes_ms;
   result.metrics.optimise_ms = refined.optimise_ms;
   result.metrics.verify_ms = refined.verify_ms;
   result.metrics.evaluations = refined.evaluations;

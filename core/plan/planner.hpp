@@ -40,7 +40,7 @@ struct PlanMetrics {
   double length_m = 0, time_s = 0;
   double jerk2 = 0;            ///< ∫‖p⃛‖² dt of the command trajectory, (m/s³)² s
   double min_clearance_m = 0;  ///< over the verified swept tube (docs/model.md section 4)
-  double search_ms = 0, optimise_ms = 0, verify_ms = 0;
+  double search_ms = 0, tubes_ms = 0, optimise_ms = 0, verify_ms = 0;  ///< together the whole, ends and metrics apart
   std::size_t expanded = 0, evaluations = 0;
   reach::Risk risk{};  ///< where one was stated
 };

@@ -127,7 +127,8 @@ RouteOutcome measure(const Route& route, const plan::World& world, const Vehicle
   RouteOutcome outcome;
   outcome.status = route.plan.status;
   outcome.planned = route.plan.metrics;
-  outcome.planning_ms = outcome.planned.search_ms + outcome.planned.optimise_ms + outcome.planned.verify_ms;
+  outcome.planning_ms =
+      outcome.planned.search_ms + outcome.planned.tubes_ms + outcome.planned.optimise_ms + outcome.planned.verify_ms;
   const auto& piece = route.piece;
   outcome.samples = piece.samples.size();
   outcome.clearance_m = std::numeric_limits<double>::infinity();

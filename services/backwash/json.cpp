@@ -41,15 +41,11 @@ Json to_json(const reach::ReachTube& tube, reach::Method method, const std::opti
 }
 
 Json to_json(const plan::PlanMetrics& m) {
-  return {{"length_m", m.length_m},
-          {"time_s", m.time_s},
-          {"jerk2", m.jerk2},
-          {"min_clearance_m", m.min_clearance_m},
-          {"search_ms", m.search_ms},
-          {"optimise_ms", m.optimise_ms},
-          {"verify_ms", m.verify_ms},
-          {"expanded", m.expanded},
-          {"evaluations", m.evaluations}};
+  return {{"length_m", m.length_m},   {"time_s", m.time_s},
+          {"jerk2", m.jerk2},         {"min_clearance_m", m.min_clearance_m},
+          {"search_ms", m.search_ms}, {"optimise_ms", m.optimise_ms},
+          {"tubes_ms", m.tubes_ms},   {"verify_ms", m.verify_ms},
+          {"expanded", m.expanded},   {"evaluations", m.evaluations}};
 }
 
 Json to_json(const plan::Region& r) {

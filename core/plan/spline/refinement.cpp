@@ -147,10 +147,12 @@ class Refiner {
     }
   }
 
-  Refined fly(const BSpline& spline) const {
+  Refined fly(const BSpline& spline) {
+    const auto begun = Clock::now();
     Refined flight{spline, spline.commands(), {}, 0};
     hold_until_settled(world_.reach, flight.commands);
     flight.tube = tube_to_rest(world_, start_.estimated, start_.command, flight.commands);
+    result_.tubes_ms += ms_since(begun);
     return flight;
   }
 

@@ -22,7 +22,7 @@ struct Refinement {
   std::optional<Refined> found;
   std::string why;           ///< what the last trajectory that failed lacked; one line
   bool out_of_time = false;  ///< the deadline ended it
-  double optimise_ms = 0, verify_ms = 0;
+  double tubes_ms = 0, optimise_ms = 0, verify_ms = 0;
   std::size_t evaluations = 0;
 };
 
