@@ -140,7 +140,7 @@ std::vector<MeasuredChange> before_after(const std::vector<FlightMeasure>& measu
       many += 1;
     else
       told.why = std::to_string(units[0].size()) + " before and " + std::to_string(units[1].size()) +
-                 " after that flew the same distances and speeds; 2 or more of each are needed";
+                 " after have it at the same distances and speeds; 2 or more of each are needed";
   }
   for (std::size_t k = 0; k < all.size(); ++k)
     if (all[k].why.empty()) judge(all[k], sides[k][0], sides[k][1], many);

@@ -33,8 +33,10 @@ void print_text(const plan::Plan& plan, bool stated) {
     else if (stated)
       std::printf("risk           nothing is within 6 standard deviations\n");
   }
-  std::printf("search         %.1f ms, %zu states\noptimisation   %.1f ms, %zu evaluations\nsets           %.1f ms\nverification   %.1f ms\n",
-              m.search_ms, m.expanded, m.optimise_ms, m.evaluations, m.tubes_ms, m.verify_ms);
+  std::printf(
+      "search         %.1f ms, %zu states\noptimisation   %.1f ms, %zu evaluations\nsets           %.1f "
+      "ms\nverification   %.1f ms\n",
+      m.search_ms, m.expanded, m.optimise_ms, m.evaluations, m.tubes_ms, m.verify_ms);
 }
 
 int run(const PlanOptions& options) {
