@@ -65,8 +65,10 @@ py::object value_of(const std::string& json) {
   return json.empty() ? py::none() : py::module_::import("json").attr("loads")(json);
 }
 
-map::OccupancyGrid grid_of(const py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>& cells,
-                           const Vec3& origin, double resolution) {
+map::OccupancyGrid grid_of(const py::array& given, const Vec3& origin, double resolution) {
+  if (!py::isinstance<py::array_t<std::uint8_t>>(given))
+    throw py::type_error("cells: needs uint8 (z, y, x): unknown 0, free 1, occupied 2");
+  const py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast> cells(given);
   if (cells.ndim() != 3 || cells.size() == 0 || !(resolution > 0) || !std::isfinite(resolution) || !origin.allFinite())
     throw py::value_error("a map needs cells (z, y, x), an origin of three numbers and a resolution above 0");
   const auto edge = [&](int axis) { return static_cast<int>(cells.shape(axis)); };
@@ -83,6 +85,7 @@ std::shared_ptr<plan::World> world_of(const map::OccupancyGrid& map, const Model
                                       const std::string& method, std::optional<double> margin,
                                       std::optional<double> risk) {
   if (method != "tight" && method != "paper") throw py::value_error("method: '" + method + "' is not tight or paper");
+  if (margin && risk) throw py::value_error("margin and risk: one of them keeps clear, give one");
   if (margin && !(*margin >= 0)) throw py::value_error("margin: it takes a number of 0 or more");
   const auto sets = method == "tight" ? reach::Method::tight : reach::Method::paper;
   return alone([&] {
@@ -206,6 +209,7 @@ void say_in_python(std::exception_ptr thrown) {
 
 // NOLINTNEXTLINE
 PYBIND11_MODULE(backwash, m) {
+  py::module_::import("numpy");  // what is without it says so at once
   be_quiet();
   py::register_exception_translator(say_in_python);
   m.doc() = kAbout;

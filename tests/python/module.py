@@ -192,8 +192,11 @@ assert raised(FileExistsError, backwash.run, "field", map=walls, model=QUAD, vol
 assert "--help" in raised(ValueError, backwash.run, "field", help=True)
 world = backwash.World(gap, model, quad)
 for wrong in ((world.sets, np.zeros((2, 2))), (world.sets, np.full((1, 3), np.nan)), (world.sets, np.zeros((0, 3))), (world.tube, np.zeros((4, 3))), (world.plan, (1, 0, 1), (5, 0, np.inf)),
-              (backwash.Map, np.full((2, 2, 2), 3, np.uint8), (0, 0, 0), 0.1), (backwash.Map, np.zeros((2, 2)), (0, 0, 0), 0.1), (backwash.Map, np.zeros((2, 2, 2)), (0, 0, 0), -1)):
+              (backwash.Map, np.full((2, 2, 2), 3, np.uint8), (0, 0, 0), 0.1), (backwash.Map, np.zeros((2, 2), np.uint8), (0, 0, 0), 0.1), (backwash.Map, np.zeros((2, 2, 2), np.uint8), (0, 0, 0), -1)):
     raised(ValueError, *wrong)
+for other in (bool, float, np.int64):  # what is cast turns walls into air
+    raised(TypeError, backwash.Map, np.zeros((2, 2, 2), other), (0, 0, 0), 0.1)
+raised(ValueError, backwash.World, gap, model, quad, margin=0.3, risk=0.01)
 raised(ValueError, world.plan, (1, 0, 1), (5, 0, 1), v_max=0)
 raised(ValueError, backwash.World, gap, model, quad, method="loose")
 raised(TypeError, backwash.field, "builtin:narrow-gap", model)

@@ -115,7 +115,37 @@ TEST(BeforeAfter, ALaterCommandIsTold) {
   Vehicle late = shipped();
   late.controller.latency += 0.03;
   const auto names = told(groups(late, 1));
-  EXPECT_TRUE(std::ranges::find(names, "worse: delay of the commands, level") != names.end());
+  EXPECT_TRUE(std::ranges::find(names, "worse: lateness of the loop, level") != names.end());
+}
+
+// What a loop is told of decides how late it seems: set-points that are logged otherwise are not compared.
+TEST(BeforeAfter, SetPointsThatAreLoggedOtherwiseTellNoLateness) {
+  const auto without = [](log::FlightLog& log) {
+    for (const char* name : {"cmd_ax_mps2", "cmd_ay_mps2", "cmd_az_mps2"}) ASSERT_EQ(log.columns.erase(name), 1u);
+  };
+  const auto held = [](log::FlightLog& log) {
+    for (auto& [name, values] : log.columns)
+      if (name.starts_with("cmd_"))
+        for (std::size_t k = 0; k < values.size(); ++k) values[k] = values[k - k % 5];
+  };
+  for (const std::function<void(log::FlightLog&)>& alter : {std::function<void(log::FlightLog&)>(without), {held}}) {
+    const auto all = groups(shipped(), 1, alter);
+    const auto measures = all.measures();
+    EXPECT_TRUE(std::ranges::any_of(measures.not_tested, [](auto& n) { return n.first == "lateness of the loop"; }));
+    for (const auto& c : before_after(measures.tested, all.after, all.unit))
+      EXPECT_EQ(c.helped, Helped::cannot_be_told) << c.measure->name;
+  }
+}
+
+// Of flights that were flown faster the page says so, whatever the measures say.
+TEST(BeforeAfter, FasterFlightsAreToldAsFlownOtherwise) {
+  FlightMeasure speed{"speed", "m/s", true, {}};
+  for (std::size_t f = 0; f < 8; ++f)
+    for (int k = 0; k < 5; ++k) speed.values.push_back({f, {}, (f < 4 ? 0.0 : 1.0) + 0.01 * static_cast<double>(f)});
+  const std::vector<FlightMeasure> flown{speed};
+  const auto changes = before_after(flown, {0, 0, 0, 0, 1, 1, 1, 1}, {0, 1, 2, 3, 4, 5, 6, 7});
+  EXPECT_NE(flown_otherwise(changes).find("speed"), std::string::npos);
+  EXPECT_EQ(flown_otherwise(before_after(flown, {0, 1, 0, 1, 0, 1, 0, 1}, {0, 1, 2, 3, 4, 5, 6, 7})), "");
 }
 
 TEST(BeforeAfter, AShakingPropellerIsToldInItsOctaveAndInNoOther) {

@@ -64,24 +64,36 @@ std::string power_words(const MeasuredChange& c) {
          " flights a side";
 }
 
+namespace {
+
+std::string named_as(const std::vector<MeasuredChange>& changes, Helped helped) {
+  std::string names;
+  for (const auto& c : changes)
+    if (c.helped == helped) names += (names.empty() ? "" : "; ") + c.measure->name + ", " + change_words(c);
+  return names;
+}
+
+}  // namespace
+
+std::string flown_otherwise(const std::vector<MeasuredChange>& flown) {
+  std::string names = named_as(flown, Helped::better);
+  const std::string more = named_as(flown, Helped::worse);
+  names += (names.empty() || more.empty() ? "" : "; ") + more;
+  return names.empty() ? "" : "The groups were flown otherwise: " + names + ". That may be all that is told.";
+}
+
 std::string headline(const std::vector<MeasuredChange>& changes) {
-  const auto named = [&](Helped helped) {
-    std::string names;
-    for (const auto& c : changes)
-      if (c.helped == helped) names += (names.empty() ? "" : "; ") + c.measure->name + ", " + change_words(c);
-    return names;
-  };
   const auto open = std::ranges::count(changes, Helped::cannot_be_told, &MeasuredChange::helped);
-  const std::string better = named(Helped::better), worse = named(Helped::worse);
+  const std::string better = named_as(changes, Helped::better), worse = named_as(changes, Helped::worse);
   std::string text = better.empty() ? "Nothing is told to be better." : "Better: " + better + ".";
   text += worse.empty() ? " Nothing is told to be worse." : " Worse: " + worse + ".";
   return text + " Of " + std::to_string(open) + (better.empty() && worse.empty() ? "" : " others") +
          " these flights cannot tell.";
 }
 
-std::string before_after_page(const std::vector<MeasuredChange>& changes, const FlightMeasures& measures,
-                              const std::string& context, const std::string& first) {
-  const std::string verdict = verdict_of(changes);
+std::string before_after_page(const std::vector<MeasuredChange>& changes, const std::vector<MeasuredChange>& flown,
+                              const FlightMeasures& measures, const std::string& context, const std::string& first) {
+  const std::string verdict = verdict_of(changes), otherwise = flown_otherwise(flown);
   std::string text = report::heads("", "told", "before", "after", "change, with its interval", "what would show"),
               untested;
   for (const auto& c : changes) {
@@ -89,12 +101,12 @@ std::string before_after_page(const std::vector<MeasuredChange>& changes, const 
     text += row(c.measure->name, told_name(c.helped), unit(c.before), unit(c.after), change_words(c), power_words(c));
   }
   for (const auto& [name, why] : measures.not_tested) untested += row(name, why);
-  std::string page = "<h1>Did the change help?</h1>\n<p class=\"context\">" + report::escaped(context) +
-                     "</p>\n<p class=\"verdict " +
-                     (verdict == "better"           ? "passed"
-                      : verdict == "cannot_be_told" ? ""
-                                                    : "failed") +
-                     "\">" + report::escaped(headline(changes)) + "</p>\n" + first;
+  std::string page =
+      "<h1>Did the change help?</h1>\n<p class=\"context\">" + report::escaped(context) + "</p>\n<p class=\"verdict " +
+      (verdict == "better" && otherwise.empty() ? "passed"
+       : verdict == "cannot_be_told"            ? ""
+                                                : "failed") +
+      "\">" + report::escaped(headline(changes) + (otherwise.empty() ? "" : " " + otherwise)) + "</p>\n" + first;
   page += report::section("After over before, by flights", report::escaped(kElse),
                           picture(changes) + report::table(text, true));
   if (!untested.empty()) page += report::section("What was not tested, and why", "", report::table(untested));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <set>
 #include <span>
 #include <utility>
 
@@ -106,10 +107,45 @@ void add_tracking(FlightMeasures& all, const Observations& seen, const std::vect
   add(all, std::move(measure), "no set-points that are followed");
 }
 
+/// Why the flights' set-points are not logged alike: a loop is late against those that it is told of. Empty: they are.
+std::string set_points_differ(const std::vector<const log::FlightLog*>& logs) {
+  std::set<std::string> columns;
+  double least = HUGE_VAL, most = 0;  // s between changes, the shortest of a flight
+  for (const auto* log : logs) {
+    std::string names;
+    for (const auto& [name, values] : log->columns)
+      if (name.starts_with("cmd_")) names += " " + name;
+    columns.insert(names.empty() ? " none" : names);
+    if (!log->has("cmd_x_m")) continue;
+    std::vector<double> periods;
+    double last = NAN;
+    for (std::size_t k = 1; k < log->t_s.size(); ++k) {
+      const auto moved = [&](const char* name) { return log->column(name)[k] != log->column(name)[k - 1]; };
+      if (!moved("cmd_x_m") && !moved("cmd_y_m") && !moved("cmd_z_m")) continue;
+      if (std::isfinite(last)) periods.push_back(log->t_s[k] - last);
+      last = log->t_s[k];
+    }
+    if (periods.empty()) continue;
+    const double period = quantile(periods, 0.5);
+    least = std::min(least, period);
+    most = std::max(most, period);
+  }
+  if (columns.size() > 1)
+    return "set-points are logged by other columns:" + *columns.begin() + "; and:" + *columns.rbegin();
+  if (most > (1 + kBeforeAfterRules.worth) * least)
+    return formatted("set-points are logged every %.3g to %.3g s", least, most);
+  return "";
+}
+
 /// A flight's Σ w g y/Σ w g² of a delay's channel, and the vehicle file's own delay.
-void add_delays(FlightMeasures& all, const Observations& seen, const Vehicle& vehicle) {
-  for (const auto& [name, channel, axis] : {std::tuple{"delay of the commands, level", kCommandDelayH, std::size_t{0}},
-                                            {"delay of the commands, up", kCommandDelayZ, std::size_t{1}}}) {
+void add_delays(FlightMeasures& all, const Observations& seen, const std::vector<const log::FlightLog*>& logs,
+                const Vehicle& vehicle) {
+  if (const auto why = set_points_differ(logs); !why.empty()) {
+    all.not_tested.emplace_back("lateness of the loop", why);
+    return;
+  }
+  for (const auto& [name, channel, axis] : {std::tuple{"lateness of the loop, level", kCommandDelayH, std::size_t{0}},
+                                            {"lateness of the loop, up", kCommandDelayZ, std::size_t{1}}}) {
     FlightMeasure measure{name, "s", false, {}};
     for (std::size_t f = 0; f < seen.flights; ++f) {
       double top = 0, bottom = 0, windows = 0;
@@ -209,6 +245,23 @@ void add_energy(FlightMeasures& all, const Observations& seen, const std::vector
   add(all, std::move(battery), "no battery_v column");
 }
 
+/// Speed, commanded acceleration and distance to the nearest surface, each flight in one cell.
+void add_flown(FlightMeasures& all, const Observations& seen) {
+  const auto flown = [&](const char* name, const char* unit, const auto& of) {
+    all.flown.push_back(by_window(seen, name, unit, true, [&](std::size_t, std::size_t i) {
+      return std::pair(Cell(), std::log(of(seen.windows[i])));
+    }));
+  };
+  flown("speed", "m/s", [](const WindowRow& w) { return std::max(w.speed, kWindowRules.still_command.value); });
+  flown("commanded acceleration", "m/s²", [](const WindowRow& w) {
+    return w.led
+               ? std::sqrt(w.led->asked2.sum() + w.led->asked_W.squaredNorm() + std::pow(kWindowRules.still_command, 2))
+               : static_cast<double>(NAN);
+  });
+  flown("distance to the nearest surface", "m",
+        [](const WindowRow& w) { return std::min(nearest_surface(w), kBeforeAfterRules.farthest_cell.value); });
+}
+
 }  // namespace
 
 FlightMeasures measures_of(const Observations& seen, const std::vector<const log::FlightLog*>& logs,
@@ -216,9 +269,10 @@ FlightMeasures measures_of(const Observations& seen, const std::vector<const log
   FlightMeasures all;
   add_variances(all, seen);
   add_tracking(all, seen, logs);
-  add_delays(all, seen, vehicle);
+  add_delays(all, seen, logs, vehicle);
   add_vibration(all, seen, logs);
   add_energy(all, seen, logs);
+  add_flown(all, seen);
   return all;
 }
 

@@ -32,12 +32,14 @@ struct FlightMeasure {
 
 struct FlightMeasures {
   std::vector<FlightMeasure> tested;
+  std::vector<FlightMeasure> flown = {};  ///< how the flights were flown, as a pilot or a plan has it: not the change
   std::vector<std::pair<std::string, std::string>> not_tested;  ///< name, why
 };
 
-/// Variance of acceleration by distance to the nearest surface, tracking error, delays of the commands, vibration by
-/// octave, hover command and battery of each flight. `logs`: those of `seen`, in its order. Vibration is tested where
-/// the logs' rates agree within a tenth: else what is faster than half of them folds back differently. O(rows).
+/// Variance of acceleration by distance to the nearest surface, tracking error, lateness of the loop (as of the vehicle
+/// file; more gain shows in it too), vibration by octave, thrust command and battery of each flight; and how it was
+/// flown. `logs`: those of `seen`, in its order. Vibration is tested where the logs' rates agree within a tenth: else
+/// what is faster than half of them folds back differently. O(rows).
 FlightMeasures measures_of(const Observations& seen, const std::vector<const log::FlightLog*>& logs,
                            const Vehicle& vehicle);
 

@@ -152,7 +152,7 @@ std::string figures(const NamedCause& cause, const PageContext& context) {
 std::string share(double value) { return number(100 * value) + " %"; }
 
 std::string plan_text(const FlightOutcome& o) {
-  if (!o.flown) return o.plan ? plan::to_string(*o.plan) : "";
+  if (!o.flown) return o.plan ? spoken(plan::to_string(*o.plan)) : "";
   return number(o.flown->length_m) + " m in " + number(o.flown->time_s) + " s, " +
          number(100 * o.flown->min_clearance_m) + " cm clear";
 }

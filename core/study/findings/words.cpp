@@ -10,6 +10,7 @@
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/when_it_acts.hpp"
 #include "core/study/inference/rules.hpp"
+#include "core/types/formatted.hpp"
 
 namespace backwash::study {
 
@@ -50,7 +51,8 @@ std::string interval_of(const NamedCause& cause, const Vehicle& vehicle) {
     std::tie(low, high) = std::minmax({end(first.low), end(first.high)});
     of = "";
   }
-  return ", " + number(low) + " to " + number(high) + of + " at 95 %";
+  const bool apart = number(low) != number(high);
+  return ", " + (apart ? number(low) + " to " + number(high) : formatted("%.5g to %.5g", low, high)) + of + " at 95 %";
 }
 
 }  // namespace
@@ -84,7 +86,8 @@ std::string advice(const StudyResult& result, const Observations& seen, const Ve
 std::string to_try(const StudyResult& result, const Vehicle& vehicle) {
   std::string text;
   for (const auto& cause : result.causes)
-    for (const auto& [key, from, to] : remedy_of(cause, vehicle).set)
+    for (const auto& [key, from, to] :
+         cause.found.rivals.empty() ? remedy_of(cause, vehicle).set : decltype(Remedy::set)())
       text += (text.empty() ? "" : " ") + key + "=" + number(to);
   return text;
 }

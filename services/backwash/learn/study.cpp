@@ -112,7 +112,10 @@ std::vector<config::ChangedKey> changed_keys(const StudyOptions& options) {
       throw Failure(kUsage, "--after " + text +
                                 ": needs KEY=VALUE of the vehicle file, as body.mass=1.02; of flights after a change, "
                                 "--before those before it");
-    changed.push_back({text.substr(0, equals), value});
+    const auto key = text.substr(0, equals);
+    if (std::ranges::find(changed, key, &config::ChangedKey::key) != changed.end())
+      throw Failure(kUsage, "--after " + key + " is given twice; give each key once");
+    changed.push_back({key, value});
   }
   return changed;
 }

@@ -53,24 +53,33 @@ int study_before_after(const BeforeAfter& asked, Flights flights, const LookedWi
     unit.push_back(unit.empty() ? 0 : unit.back() + (same ? 0 : 1));
     if (!flights.group.empty()) group = flights.group[k];
   }
+  for (const bool side : {false, true})
+    if (std::ranges::find(after, static_cast<char>(side)) == after.end())
+      throw Failure(kBadData,
+                    std::string(side ? "--after" : "--before") + ": no flight of it is left; see what was left out");
   const auto seen = observations(flights, with);
   const auto measures = study::measures_of(seen, logs, with.vehicle);
   const auto changes = study::before_after(measures.tested, after, unit);
+  const auto flown = study::before_after(measures.flown, after, unit);
+  const auto otherwise = study::flown_otherwise(flown);
   Json json = {{"verdict", study::verdict_of(changes)},
                {"flights", {{"before", std::ranges::count(after, 0)}, {"after", std::ranges::count(after, 1)}}},
+               {"flown_otherwise", otherwise},
                {"measures", Json::array()},
                {"not_tested", Json::array()}};
   for (const auto& c : changes) json["measures"].push_back(to_json(c));
   for (const auto& [name, why] : measures.not_tested) json["not_tested"].push_back({{"name", name}, {"why", why}});
   for (const auto& [log, known] : flights.twice) json["counted_once"].push_back({{"log", log}, {"same_as", known}});
   if (!asked.page.empty())
-    write_file(asked.page, study::before_after_page(changes, measures, asked.context, html(with.notes)), asked.force);
+    write_file(asked.page, study::before_after_page(changes, flown, measures, asked.context, html(with.notes)),
+               asked.force);
   if (asked.json) {
     print(told_first(with.notes, json));
     return kOk;
   }
   print_text(with.notes);
   std::printf("%s\n", study::headline(changes).c_str());
+  if (!otherwise.empty()) std::printf("%s\n", otherwise.c_str());
   for (const auto& c : changes) {
     const auto power = study::power_words(c);
     std::printf("%-14s  %s: %s%s\n", study::to_string(c.helped), c.measure->name.c_str(),

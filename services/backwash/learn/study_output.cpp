@@ -168,7 +168,10 @@ Json to_json(const study::StudyResult& result, const study::Observations& seen, 
 
 Json to_json(const study::Consequence& c) {
   Json json = {{"places", c.places}, {"before", to_json(c.before)}, {"after", to_json(c.after)}};
-  if (c.corrected) json["corrected"] = to_json(*c.corrected);
+  if (c.corrected) {
+    json["corrected"] = to_json(*c.corrected);
+    json["corrected"].erase("samples_inside_bound");  // not simulated anew
+  }
   if (const auto cost = study::clearance_cost(c)) json["clearance_cost_m"] = *cost;
   if (c.before.plan) json.update({{"start", to_json(c.start_W)}, {"goal", to_json(c.goal_W)}});
   return json;

@@ -48,7 +48,11 @@ Remedy of_either(const FittedForm& fitted, const Vehicle& v) {
         "Look for heavier propellers or slower speed controllers than the simulation has; the model of --out has the "
         "lag.");
   const double now = v.controller.attitude_lag;
-  const double lags = std::max(0.0, now + fitted.theta[0]);
+  const double lags = now + fitted.theta[0];
+  if (lags < 0)
+    return with_craft(
+        "The attitude answers before its set-point: look whether the log holds attitude and the set-points' "
+        "accelerations.");
   return in_vehicle({{"controller.attitude_lag", now, lags}},
                     formatted("The attitude lags %.3g s, not %.3g", lags, now));
 }

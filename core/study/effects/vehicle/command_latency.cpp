@@ -21,6 +21,11 @@ Effect command_latency() {
               [](auto& fitted, auto& v) {
                 const double now = v.controller.latency;
                 const double acts = now + fitted.theta[0];
+                if (acts < 0)
+                  return with_craft(formatted(
+                      "The craft answers %.3g s before its set-points: look at their stamps, at how often they are "
+                      "logged, and whether their velocities and accelerations are.",
+                      -acts));
                 return in_vehicle({{"controller.latency", now, acts}},
                                   formatted("Set-points act %.3g s late, not %.3g", acts, now));
               },
