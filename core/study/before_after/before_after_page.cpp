@@ -10,6 +10,7 @@
 #include "core/study/before_after/before_after_rules.hpp"
 #include "core/study/findings/page_sections.hpp"
 #include "core/study/findings/words.hpp"
+#include "core/types/formatted.hpp"
 
 namespace backwash::study {
 namespace {
@@ -51,7 +52,9 @@ std::string picture(const std::vector<MeasuredChange>& changes) {
 std::string change_words(const MeasuredChange& c) {
   if (!c.why.empty()) return c.why;
   const std::string unit = c.measure->ratio ? " times" : " " + c.measure->unit;
-  return number(c.change) + unit + " [" + number(c.low) + ", " + number(c.high) + "]";
+  const char* const close = "%.5g%s [%.5g, %.5g]";
+  return formatted(number(c.low) == number(c.high) ? close : "%.3g%s [%.3g, %.3g]", c.change, unit.c_str(), c.low,
+                   c.high);
 }
 
 std::string power_words(const MeasuredChange& c) {
@@ -75,7 +78,9 @@ std::string named_as(const std::vector<MeasuredChange>& changes, Helped helped) 
 
 }  // namespace
 
-std::string flown_otherwise(const std::vector<MeasuredChange>& flown) {
+std::string flown_otherwise(std::vector<MeasuredChange> flown) {
+  std::erase_if(flown,
+                [](const auto& c) { return std::abs(std::log(c.change)) < std::log1p(kBeforeAfterRules.alike); });
   std::string names = named_as(flown, Helped::better);
   const std::string more = named_as(flown, Helped::worse);
   names += (names.empty() || more.empty() ? "" : "; ") + more;

@@ -12,6 +12,7 @@ struct BeforeAfterRules {
   Rule told_level{"told_level", 0.05, "1", "chosen: chance that anything at all is told of flights that differ in nothing, better or worse"};
   Rule told_power{"told_power", 0.8, "1", "chosen: four times in five, as the smallest effects of a study"};
   Rule worth{"worth", 0.1, "of what was before", "chosen: the change for which the number of flights is told"};
+  Rule alike{"alike", 0.1, "of the least", "chosen: rates, periods of set-points and ways of flying that differ less are alike"};
   Rule fewest_windows{"fewest_windows", 3, "windows", "chosen: fewer say little of a flight"};
   Rule most_needed{"most_needed", 1000, "flights", "chosen: more are told as more"};
   Rule nearest_cell{"nearest_cell", 0.25, "m", "chosen: what is nearer is one place; beyond it an octave is one"};

@@ -5,10 +5,11 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <set>
 #include <span>
+#include <tuple>
 #include <utility>
 
+#include "core/log/columns/log_columns.hpp"
 #include "core/study/before_after/before_after_rules.hpp"
 #include "core/study/windows/signals/band.hpp"
 #include "core/types/formatted.hpp"
@@ -71,6 +72,60 @@ double ln_mean(const WindowRow& w, const log::FlightLog& log, const Square& squa
   return until > from && sum > 0 ? std::log(sum / static_cast<double>(until - from)) : NAN;
 }
 
+/// s between changes of the set-points' positions, on the median of a flight; longer ones are steps. NaN: only those.
+double period_of_set_points(const log::FlightLog& log) {
+  std::vector<double> periods;
+  double last = NAN;
+  for (std::size_t k = 1; k < log.t_s.size() && log.has("cmd_x_m"); ++k) {
+    const auto moved = [&](const char* name) { return log.column(name)[k] != log.column(name)[k - 1]; };
+    if (!moved("cmd_x_m") && !moved("cmd_y_m") && !moved("cmd_z_m")) continue;
+    if (log.t_s[k] - last < kWindowRules.settle) periods.push_back(log.t_s[k] - last);
+    last = log.t_s[k];
+  }
+  return periods.empty() ? NAN : quantile(periods, 0.5);
+}
+
+/// Hz, of a flight's rows on the mean.
+double rate_of(const log::FlightLog& log) {
+  return static_cast<double>(log.t_s.size() - 1) / std::max(log.t_s.back() - log.t_s.front(), kWindowRules.gap.value);
+}
+
+/// The columns that the simulation is fed with.
+std::string fed_by(const log::FlightLog& log) {
+  std::string names;
+  for (const auto& [name, values] : log.columns)
+    if (name.starts_with("cmd_") || name == "thrust" || name == "qw" || name == "ax_mps2" || name == "vx_mps")
+      names += (names.empty() ? "" : " ") + name;
+  return names.empty() ? "positions alone" : names;
+}
+
+/// Whether each flight is logged as most are, by what `of` says of it; `differs`: of two such.
+template <typename Of, typename Differs>
+void keep_alike(std::vector<char>& kept, const std::vector<const log::FlightLog*>& logs, const Of& of,
+                const Differs& differs) {
+  std::size_t most = 0, best = 0;
+  for (std::size_t f = 0; f < logs.size(); ++f) {
+    const auto same = static_cast<std::size_t>(
+        std::ranges::count_if(logs, [&](auto* other) { return !differs(of(*logs[f]), of(*other)); }));
+    if (same > most) std::tie(most, best) = std::pair(same, f);
+  }
+  for (std::size_t f = 0; f < logs.size(); ++f)
+    if (differs(of(*logs[best]), of(*logs[f]))) kept[f] = 0;
+}
+
+/// Flights that are logged as most are: what is measured of the loop and of the air follows from the columns, from how
+/// often set-points change, and from the rate, above half of which everything folds back.
+std::vector<char> logged_alike(const std::vector<const log::FlightLog*>& logs) {
+  std::vector<char> kept(logs.size(), 1);
+  const auto apart = [](double a, double b) {
+    return std::max(a, b) > (1 + kBeforeAfterRules.alike) * std::min(a, b);  // steps alone, NaN, differ from nothing
+  };
+  keep_alike(kept, logs, fed_by, [](const auto& a, const auto& b) { return a != b; });
+  keep_alike(kept, logs, rate_of, apart);
+  keep_alike(kept, logs, period_of_set_points, apart);
+  return kept;
+}
+
 /// Of each distance that some flight has windows at. Three axes' mean, over the modelled variance of the place: what
 /// the model says of two places in one cell is no change.
 void add_variances(FlightMeasures& all, const Observations& seen) {
@@ -107,45 +162,10 @@ void add_tracking(FlightMeasures& all, const Observations& seen, const std::vect
   add(all, std::move(measure), "no set-points that are followed");
 }
 
-/// Why the flights' set-points are not logged alike: a loop is late against those that it is told of. Empty: they are.
-std::string set_points_differ(const std::vector<const log::FlightLog*>& logs) {
-  std::set<std::string> columns;
-  double least = HUGE_VAL, most = 0;  // s between changes, the shortest of a flight
-  for (const auto* log : logs) {
-    std::string names;
-    for (const auto& [name, values] : log->columns)
-      if (name.starts_with("cmd_")) names += " " + name;
-    columns.insert(names.empty() ? " none" : names);
-    if (!log->has("cmd_x_m")) continue;
-    std::vector<double> periods;
-    double last = NAN;
-    for (std::size_t k = 1; k < log->t_s.size(); ++k) {
-      const auto moved = [&](const char* name) { return log->column(name)[k] != log->column(name)[k - 1]; };
-      if (!moved("cmd_x_m") && !moved("cmd_y_m") && !moved("cmd_z_m")) continue;
-      if (std::isfinite(last)) periods.push_back(log->t_s[k] - last);
-      last = log->t_s[k];
-    }
-    if (periods.empty()) continue;
-    const double period = quantile(periods, 0.5);
-    least = std::min(least, period);
-    most = std::max(most, period);
-  }
-  if (columns.size() > 1)
-    return "set-points are logged by other columns:" + *columns.begin() + "; and:" + *columns.rbegin();
-  if (most > (1 + kBeforeAfterRules.worth) * least)
-    return formatted("set-points are logged every %.3g to %.3g s", least, most);
-  return "";
-}
-
 /// A flight's Σ w g y/Σ w g² of a delay's channel, and the vehicle file's own delay.
-void add_delays(FlightMeasures& all, const Observations& seen, const std::vector<const log::FlightLog*>& logs,
-                const Vehicle& vehicle) {
-  if (const auto why = set_points_differ(logs); !why.empty()) {
-    all.not_tested.emplace_back("lateness of the loop", why);
-    return;
-  }
-  for (const auto& [name, channel, axis] : {std::tuple{"lateness of the loop, level", kCommandDelayH, std::size_t{0}},
-                                            {"lateness of the loop, up", kCommandDelayZ, std::size_t{1}}}) {
+void add_delays(FlightMeasures& all, const Observations& seen, const Vehicle& vehicle) {
+  for (const auto& [name, channel, axis] : {std::tuple{"loop latency, level", kCommandDelayH, std::size_t{0}},
+                                            {"loop latency, up", kCommandDelayZ, std::size_t{1}}}) {
     FlightMeasure measure{name, "s", false, {}};
     for (std::size_t f = 0; f < seen.flights; ++f) {
       double top = 0, bottom = 0, windows = 0;
@@ -186,37 +206,24 @@ double power_within(const WindowRow& w, const log::FlightLog& log, const char* c
 
 /// Vertical, level and forward together: no axis of the body need be known.
 void add_vibration(FlightMeasures& all, const Observations& seen, const std::vector<const log::FlightLog*>& logs) {
-  double slowest = HUGE_VAL, fastest = 0;
-  bool measured = true;
-  for (const auto* log : logs) {
-    const double span = log->t_s.back() - log->t_s.front();
-    const double rate = static_cast<double>(log->t_s.size() - 1) / std::max(span, kWindowRules.gap.value);
-    slowest = std::min(slowest, rate);
-    fastest = std::max(fastest, rate);
-    measured = measured && log->has("ax_mps2") && log->has("ay_mps2") && log->has("az_mps2");
-  }
+  double slowest = HUGE_VAL;
+  for (const auto* log : logs) slowest = std::min(slowest, rate_of(*log));
   const double highest = kWindowRules.rate_share * slowest;
-  const auto not_tested = [&](const std::string& why) { all.not_tested.emplace_back("vibration", why); };
-  if (!measured) return not_tested("a log has no acceleration");
-  if (fastest > (1 + kBeforeAfterRules.worth) * slowest)
-    return not_tested(formatted(
-        "logged at %.4g to %.4g Hz: what is faster than half of that folds back differently; log all at one rate",
-        slowest, fastest));
   if (highest <= kBeforeAfterRules.lowest_vibration)
-    return not_tested(formatted("logged at %.4g Hz: log faster", slowest));
+    return void(all.not_tested.emplace_back("vibration", formatted("logged at %.4g Hz: log faster", slowest)));
   for (double low = kBeforeAfterRules.lowest_vibration; low < highest; low *= 2) {
     const Band band{low, std::min(2 * low, highest)};
     const auto name = formatted("vibration, %.3g to %.3g Hz", band.low_hz, band.high_hz);
     add(all,
         by_window(seen, name, "m/s²", true,
                   [&](std::size_t f, std::size_t i) {
-                    double power = 0;
+                    double power = log::has_xyz(*logs[f], "a", "_mps2") ? 0 : NAN;
                     for (const char* axis : {"ax_mps2", "ay_mps2", "az_mps2"})
-                      power += power_within(seen.windows[i], *logs[f], axis, band);
+                      power += std::isnan(power) ? 0 : power_within(seen.windows[i], *logs[f], axis, band);
                     return std::pair(cell_of(seen.windows[i]),
                                      power > 0 ? std::log(power) / 2 : static_cast<double>(NAN));
                   }),
-        "no window is long enough");
+        "no acceleration, or no window that is long enough");
   }
 }
 
@@ -269,8 +276,14 @@ FlightMeasures measures_of(const Observations& seen, const std::vector<const log
   FlightMeasures all;
   add_variances(all, seen);
   add_tracking(all, seen, logs);
-  add_delays(all, seen, logs, vehicle);
+  add_delays(all, seen, vehicle);
   add_vibration(all, seen, logs);
+  const auto kept = logged_alike(logs);
+  for (auto& measure : all.tested) std::erase_if(measure.values, [&](const auto& v) { return !kept[v.flight]; });
+  if (const auto out = std::ranges::count(kept, 0); out > 0)
+    all.not_tested.emplace_back(
+        formatted("all but thrust command and battery of %zd of %zu flights", out, logs.size()),
+        "they log other columns than most, at another rate, or set-points at other times: log all alike");
   add_energy(all, seen, logs);
   add_flown(all, seen);
   return all;

@@ -36,10 +36,10 @@ struct FlightMeasures {
   std::vector<std::pair<std::string, std::string>> not_tested;  ///< name, why
 };
 
-/// Variance of acceleration by distance to the nearest surface, tracking error, lateness of the loop (as of the vehicle
-/// file; more gain shows in it too), vibration by octave, thrust command and battery of each flight; and how it was
-/// flown. `logs`: those of `seen`, in its order. Vibration is tested where the logs' rates agree within a tenth: else
-/// what is faster than half of them folds back differently. O(rows).
+/// Variance of acceleration by distance to the nearest surface, tracking error, loop latency (as of the vehicle file:
+/// another gain shows in it too), vibration by octave, thrust command and battery of each flight; and how it was flown.
+/// `logs`: those of `seen`, in its order, one or more. All but the last two are of the flights that are
+/// logged as most are (columns, rate, set-points), since what is measured depends on that. O(rows · frequencies).
 FlightMeasures measures_of(const Observations& seen, const std::vector<const log::FlightLog*>& logs,
                            const Vehicle& vehicle);
 

@@ -85,10 +85,11 @@ std::string advice(const StudyResult& result, const Observations& seen, const Ve
 
 std::string to_try(const StudyResult& result, const Vehicle& vehicle) {
   std::string text;
-  for (const auto& cause : result.causes)
-    for (const auto& [key, from, to] :
-         cause.found.rivals.empty() ? remedy_of(cause, vehicle).set : decltype(Remedy::set)())
+  for (const auto& cause : result.causes) {
+    if (!cause.found.rivals.empty()) continue;
+    for (const auto& [key, from, to] : remedy_of(cause, vehicle).set)
       text += (text.empty() ? "" : " ") + key + "=" + number(to);
+  }
   return text;
 }
 
