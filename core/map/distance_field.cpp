@@ -11,20 +11,6 @@
 namespace backwash::map {
 namespace {
 
-/// The eight centres around a point and its position between them.
-struct Corners {
-  std::array<double, 8> d;  // bit 0: upper in x, bit 1: y, bit 2: z
-  Vec3 t;                   // 0 … 1
-};
-
-Corners corners(const DistanceField& field, const Vec3& q) noexcept {
-  const Vec3 floor = (q.array() - 0.5).floor();
-  const Index3 base = floor.cast<int>();
-  Corners c{{}, q - Vec3::Constant(0.5) - floor};
-  for (int i = 0; i < 8; ++i) c.d[static_cast<std::size_t>(i)] = field.at(base + Index3(i & 1, i >> 1 & 1, i >> 2));
-  return c;
-}
-
 double mix(double a, double b, double t) noexcept { return a + (b - a) * t; }
 
 /// Gap between coordinate q and the interval [i, i + 1].
@@ -73,22 +59,44 @@ bool DistanceField::covers(const Vec3& q) const noexcept {
   return (q.array() >= 0.0).all() && (q.array() < squared_.size().cast<double>().array()).all();  // false for NaN
 }
 
+DistanceField::Corners DistanceField::corners(const Vec3& q) const noexcept {
+  const Vec3 floor = (q.array() - 0.5).floor();
+  const Index3 base = floor.cast<int>();
+  Corners c{{}, q - Vec3::Constant(0.5) - floor};
+  const bool within = inside(squared_.size(), base) && inside(squared_.size(), base + Index3::Ones());
+  for (int row = 0; row < 4; ++row) {
+    const Index3 v = base + Index3(0, row & 1, row >> 1);
+    const auto n = static_cast<std::size_t>(2 * row);
+    if (within) {
+      const std::uint16_t* const cells = squared_.row(v.y(), v.z()) + v.x();
+      c.d[n] = metres(cells[0]);
+      c.d[n + 1] = metres(cells[1]);
+    } else {
+      c.d[n] = at(v);
+      c.d[n + 1] = at(v + Index3::UnitX());
+    }
+  }
+  return c;
+}
+
 double DistanceField::interpolated(const Vec3& p_W) const noexcept {
   const Vec3 q = (p_W - origin_W_) / resolution_;
   if (!covers(q)) return 0.0;
-  const auto [d, t] = corners(*this, q);
+  const auto [d, t] = corners(q);
   return mix(mix(mix(d[0], d[1], t.x()), mix(d[2], d[3], t.x()), t.y()),
              mix(mix(d[4], d[5], t.x()), mix(d[6], d[7], t.x()), t.y()), t.z());
 }
 
-Vec3 DistanceField::gradient(const Vec3& p_W) const noexcept {
+DistanceField::Linear DistanceField::linear(const Vec3& p_W) const noexcept {
   const Vec3 q = (p_W - origin_W_) / resolution_;
-  if (!covers(q)) return Vec3::Zero();
-  const auto [d, t] = corners(*this, q);
+  if (!covers(q)) return {0.0, Vec3::Zero()};
+  const auto [d, t] = corners(q);
+  const double a = mix(d[0], d[1], t.x()), b = mix(d[2], d[3], t.x()), c = mix(d[4], d[5], t.x()),
+               e = mix(d[6], d[7], t.x());
   const Vec3 per_voxel(mix(mix(d[1] - d[0], d[3] - d[2], t.y()), mix(d[5] - d[4], d[7] - d[6], t.y()), t.z()),
                        mix(mix(d[2] - d[0], d[3] - d[1], t.x()), mix(d[6] - d[4], d[7] - d[5], t.x()), t.z()),
                        mix(mix(d[4] - d[0], d[5] - d[1], t.x()), mix(d[6] - d[2], d[7] - d[3], t.x()), t.y()));
-  return per_voxel / resolution_;
+  return {mix(mix(a, b, t.y()), mix(c, e, t.y()), t.z()), per_voxel / resolution_};
 }
 
 double DistanceField::exact(const OccupancyGrid& grid, const Vec3& p_W) const noexcept {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 
@@ -28,14 +29,24 @@ class DistanceField {
   /// near faces (a/4 on a flat one, 0.56a on a convex corner): for gradients and search; exact() for what must hold.
   /// Real-time: wait-free, no allocation.
   double interpolated(const Vec3& p_W) const noexcept;
-  /// Gradient of interpolated(), unitless; zero outside the grid. Real-time: wait-free, no allocation.
-  Vec3 gradient(const Vec3& p_W) const noexcept;
+  /// interpolated() and its gradient, unitless; zero outside the grid. Real-time: wait-free, no allocation.
+  struct Linear {
+    double distance;
+    Vec3 gradient;
+  };
+  Linear linear(const Vec3& p_W) const noexcept;
+  Vec3 gradient(const Vec3& p_W) const noexcept { return linear(p_W).gradient; }
   /// Exact distance from any point to the nearest obstacle face, m: a local search bounded by at(), 0 inside obstacles
   /// and outside the grid. O((distance/a)²) rows. `grid` is the one this was built from.
   /// Real-time: wait-free, no allocation.
   double exact(const OccupancyGrid& grid, const Vec3& p_W) const noexcept;
 
  private:
+  struct Corners {            // the eight centres around a point
+    std::array<double, 8> d;  // m; bit 0: upper in x, bit 1: y, bit 2: z
+    Vec3 t;                   // the point's place between them, 0 … 1
+  };
+  Corners corners(const Vec3& q) const noexcept;
   bool covers(const Vec3& q) const noexcept;  // q in voxels from the origin
   double metres(std::uint16_t squared) const noexcept {
     return static_cast<double>(static_cast<float>(half_voxel_ * std::sqrt(static_cast<double>(squared))));

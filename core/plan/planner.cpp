@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kSearchShare = 0.9;   ///< of the limits: re-timing has little left to do
 constexpr double kClearanceCap = 2.0;  ///< m
+constexpr std::size_t kPiece = 8;      ///< steps that a clearance looks at together
 
 Plan refused(Plan plan, PlanStatus status, std::string message) {
   plan.status = status;
@@ -50,14 +51,33 @@ PlanStatus status_of(SearchFailure::Kind kind) {
   }
 }
 
-PlanMetrics measured(PlanMetrics metrics, const BSpline& spline, double clearance) {
+PlanMetrics measured(PlanMetrics metrics, const BSpline& spline, const std::vector<Setpoint>& commands,
+                     double clearance) {
   metrics.time_s = spline.duration();
   metrics.jerk2 = spline.jerk2();
   metrics.min_clearance_m = clearance;
-  const auto commands = spline.commands();
   for (std::size_t k = 0; k + 1 < commands.size(); ++k)
     metrics.length_m += (commands[k + 1].p_W - commands[k].p_W).norm();
   return metrics;
+}
+
+/// At most the distance of the sets of the steps from `first` to before `end`, or `limit`: of a straight flight that
+/// holds them, m.
+double hull_distance(const World& world, const reach::ReachTube& tube, std::size_t first, std::size_t end, bool ball,
+                     double limit) {
+  const Vec3 &from = tube[first].center.p_W, &to = tube[std::min(end, tube.size() - 1)].center.p_W;
+  const Vec3 along = to - from;
+  const double length2 = along.squaredNorm();
+  PerDirection hull{};
+  double off = 0;
+  for (std::size_t k = first; k <= std::min(end, tube.size() - 1); ++k) {
+    const Vec3 p = tube[k].center.p_W - from;
+    const double share = length2 > 0 ? std::clamp(p.dot(along) / length2, 0.0, 1.0) : 0.0;
+    off = std::max(off, (p - share * along).norm());
+    for (std::size_t d = 0; d < kDirections && k < end && !ball; ++d)
+      hull[d] = std::max(hull[d], tube[k].half_widths_interval[d]);
+  }
+  return reach::swept_prism_distance(world.grid, from, to, hull, limit + off) - off;
 }
 
 }  // namespace
@@ -107,7 +127,7 @@ Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const 
     return refused(result, PlanStatus::deadline, "optimisation ran out of time");
   if (!refined.found) return refused(result, PlanStatus::infeasible, refined.why);
   Refined& found = *refined.found;
-  result.metrics = measured(result.metrics, found.trajectory, found.clearance_m);
+  result.metrics = measured(result.metrics, found.trajectory, found.commands, found.clearance_m);
   result.metrics.risk = found.risk;
   result.status = PlanStatus::ok;
   result.trajectory = std::move(found.trajectory);
@@ -137,28 +157,36 @@ Approach nearest_approach(const World& world, const reach::ReachTube& tube) {
   const double taken = reach::body_and_estimation(vehicle) + ball.value_or(0.0);
   const auto half_widths = [&](std::size_t k) { return ball ? PerDirection{} : tube[k].half_widths_interval; };
   const auto next = [&](std::size_t k) { return std::min(k + 1, tube.size() - 1); };
-  // Distance is 1-Lipschitz, so the interpolated one is off by a voxel diagonal at most:
-  // that bounds each step from below and leaves few exact queries.
-  const double slack = world.grid.resolution() * std::sqrt(3.0);
-  std::vector<std::pair<double, std::size_t>> order;
+  // The interpolated distance is off by half a voxel's diagonal at most: that bounds each step from below. Steps whose
+  // hull about a straight flight is no nearer than the nearest are passed over together.
+  const double slack = world.grid.resolution() * std::sqrt(3.0) / 2 + 1e-6;
+  std::vector<double> bound(tube.size());
+  std::vector<std::pair<double, std::size_t>> pieces;
   double least = kClearanceCap + taken;
   for (std::size_t k = 0; k < tube.size(); ++k) {
     const PerDirection h = half_widths(k);
-    const double extent = Vec3(h[kX], h[kY], h[kZ]).norm();
+    const double extent = reach::circumradius(h);
     const double motion = (tube[next(k)].center.p_W - tube[k].center.p_W).norm();
     const double distance = world.distance.interpolated(tube[k].center.p_W);
-    order.emplace_back(distance - slack - extent - 2 * motion, k);
-    least = std::min(least, distance + slack + 1e-6);  // the set holds its centre
+    bound[k] = distance - slack - extent - motion;
+    if (k % kPiece == 0) pieces.emplace_back(bound[k], k);
+    pieces.back().first = std::min(pieces.back().first, bound[k]);
+    least = std::min(least, distance + slack);  // the set holds its centre
   }
-  std::ranges::sort(order);
-  std::size_t where = order.front().second;
-  for (const auto& [bound, k] : order) {
-    if (bound >= least) break;
-    const double distance =
-        reach::swept_prism_distance(world.grid, tube[k].center.p_W, tube[next(k)].center.p_W, half_widths(k), least);
-    if (distance < least) {
-      least = distance;
-      where = k;
+  std::ranges::sort(pieces);
+  std::size_t where = pieces.front().second;
+  for (const auto& [lowest, first] : pieces) {
+    if (lowest >= least) break;
+    const std::size_t end = std::min(first + kPiece, tube.size());
+    if (hull_distance(world, tube, first, end, ball.has_value(), least) >= least) continue;
+    for (std::size_t k = first; k < end; ++k) {
+      if (bound[k] >= least) continue;
+      const double distance =
+          reach::swept_prism_distance(world.grid, tube[k].center.p_W, tube[next(k)].center.p_W, half_widths(k), least);
+      if (distance < least) {
+        least = distance;
+        where = k;
+      }
     }
   }
   return {least - taken, tube[where].center, tube[where].t};

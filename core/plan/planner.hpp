@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "core/plan/search/kinodynamic_astar.hpp"
 #include "core/plan/spline/bspline.hpp"
-#include "core/plan/spline/bspline_optimizer.hpp"
 #include "core/plan/spline/yaw.hpp"
 #include "core/plan/world/world.hpp"
 #include "core/reach/risk.hpp"
@@ -29,8 +29,6 @@ struct PlanOptions {
   double a_max;                     ///< m/s² per axis
   double deadline_s = 10.0;         ///< whole plan, monotonic clock; what is found when it passes is still verified
   std::size_t max_nodes = 400'000;  ///< states that an attempt of the search may keep
-  std::size_t evaluations = 50;     ///< of the cost, per round of the optimiser
-  std::size_t polish = 400;         ///< evaluations spent on a trajectory that is verified already, while they pay
   YawLimits yaw{};                  ///< the heading follows the path; rate 0: it is held
   bool norm_cost = false;           ///< the cost takes ‖h‖₂ for the set, as the paper does: for comparison only
   double least_clearance_m = 0;     ///< that the verified tube, and hovering at start and goal, must pass, m
@@ -41,8 +39,8 @@ struct PlanMetrics {
   double jerk2 = 0;            ///< ∫‖p⃛‖² dt of the command trajectory, (m/s³)² s
   double min_clearance_m = 0;  ///< over the verified swept tube (docs/model.md section 4)
   double search_ms = 0, tubes_ms = 0, optimise_ms = 0, verify_ms = 0;  ///< together the whole, ends and metrics apart
-  std::size_t expanded = 0, evaluations = 0;
-  reach::Risk risk{};  ///< where one was stated
+  std::size_t expanded = 0, evaluations = 0;                           ///< states of the search, steps of the optimiser
+  reach::Risk risk{};                                                  ///< where one was stated
 };
 
 /// The model by which a stated risk is kept in place of the worst case (docs/model.md 5.3-5): what is kept clear in its
@@ -62,7 +60,8 @@ struct Plan {
 
 /// Start of a plan: the state estimated now and the command active now (for continuity).
 /// Kinodynamic search → B-spline fit → optimisation → verification of the whole swept tube (docs/model.md section 5b).
-/// What fails verification is re-optimised with a larger margin, then slowed, then refused; never returned as ok.
+/// The first that is verified is returned. What fails is optimised again about its own sets with a larger margin, then
+/// slowed, then refused; never returned as ok.
 Plan plan(const World& world, const PlanStart& start, const Vec3& goal_W, const PlanOptions& options);
 
 /// Where a tube comes nearest to obstacles.

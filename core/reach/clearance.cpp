@@ -248,6 +248,13 @@ double body_and_estimation(const Vehicle& vehicle) noexcept {
   return vehicle.body.radius + vehicle.estimation.position;
 }
 
+double circumradius(const PerDirection& half_widths) noexcept {
+  const Supports s = tight_supports(half_widths);
+  const double side = std::max(std::abs(s.sum - s.x), std::abs(s.difference - s.x)),
+               end = std::max(std::abs(s.sum - s.y), std::abs(s.difference - s.y));
+  return std::sqrt(std::max(s.x * s.x + side * side, s.y * s.y + end * end) + s.z * s.z);
+}
+
 // A voxel is a box, so its distance to the prism is that of its centre to prism ⊕ box, whose supports are the sums.
 double prism_distance(const map::OccupancyGrid& grid, const Vec3& center_W, const PerDirection& half_widths,
                       double limit, const map::OccupancySums* sums) {

@@ -12,6 +12,9 @@
 
 namespace backwash::reach {
 
+/// The largest distance of a point of the prism from its centre, m.
+double circumradius(const PerDirection& half_widths) noexcept;
+
 /// Clearances of hover sets are exact up to this, m; larger ones are told as this.
 inline constexpr double kHoverClearanceCap = 1.0;
 

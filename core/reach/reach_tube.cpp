@@ -77,21 +77,27 @@ std::vector<State> centres(const Reachability& reach, const State& start, const 
   return states;
 }
 
-// Runs the sets along the centres; bound_of(k, sets) is the bound of step k, given the sets at its start.
+// The bound of a step, and the half widths that it leads to until the next.
+struct Bounded {
+  DisturbanceBound w;
+  PerDirection half_widths_interval;
+};
+
+// Runs the sets along the centres; bound_of(k, sets) is that of step k, given the sets at its start.
 template <typename Sets, typename BoundOf>
 ReachTube propagate(const Reachability& reach, const std::vector<State>& centers, BoundOf bound_of) {
   Sets sets(reach);
   ReachTube tube;
   tube.reserve(centers.size());
-  DisturbanceBound w;
+  Bounded step;
   for (std::size_t k = 0; k < centers.size(); ++k) {
     const bool last = k + 1 == centers.size();
-    if (!last) w = bound_of(k, sets);
+    step = last ? Bounded{step.w, sets.half_widths_until_next(step.w)} : bound_of(k, sets);
     const PerDirection h = sets.half_widths();
     const Mat3 shape = sets.shape();
-    tube.push_back({static_cast<double>(k) * kControlPeriod, centers[k], w, h, sets.half_widths_until_next(w), shape,
+    tube.push_back({static_cast<double>(k) * kControlPeriod, centers[k], step.w, h, step.half_widths_interval, shape,
                     largest_half_axis(shape, h, reach.method)});
-    if (!last) sets.step(w);
+    if (!last) sets.step(step.w);
   }
   return tube;
 }
@@ -107,33 +113,55 @@ bool covers(const PerDirection& a, const PerDirection& b) {
   return true;
 }
 
+// BoundField::max_over of the boxes of one tube, most of which meet the voxels that the one before met.
+class LastMaximum {
+ public:
+  explicit LastMaximum(const BoundField& bounds) : bounds_(bounds) {}
+  const DisturbanceBound& over(const Vec3& low_W, const Vec3& high_W) noexcept {
+    const map::VoxelBox box = bounds_.meeting(low_W, high_W);
+    if (box.low != box_.low || box.high != box_.high) {
+      box_ = box;
+      w_ = bounds_.max_over_voxels(box.low, box.high);
+    }
+    return w_;
+  }
+
+ private:
+  const BoundField& bounds_;
+  map::VoxelBox box_{Index3::Ones(), Index3::Zero()};  // meets none: 0
+  DisturbanceBound w_;
+};
+
 // A bound that is not below the field's maximum over the set it leads to itself, while the centre moves from one state
 // to the next. The set grows by dt²/2 per unit of bound within a step, so one or two rounds settle it; the reach is
 // doubled after that, which ends at the whole field at the latest.
 template <typename Sets>
-DisturbanceBound bound_over_set(const Sets& sets, const State& from, const State& to, const BoundField& bounds,
-                                const NetDisturbance& net) {
+Bounded bound_over_set(const Sets& sets, const State& from, const State& to, const BoundField& bounds,
+                       const NetDisturbance& net, LastMaximum& last) {
   const Vec3 low = from.p_W.cwiseMin(to.p_W), high = from.p_W.cwiseMax(to.p_W);
   const Vec3 push = bounds.push(from.p_W, from.v_W);
   const auto over = [&](const PerDirection& h) {
     const Vec3 reach(h[kX], h[kY], h[kZ]);
     if (net.held()) return net(bounds.max_without_push(from.v_W, low - reach, high + reach));
+    if (bounds.extension().none()) return last.over(low - reach, high + reach);
     return bounds.max_about(push, from.v_W, low - reach, high + reach);
   };
   DisturbanceBound w = over(sets.half_widths());
   constexpr int kRounds = 4, kDoublings = 60;
   for (int round = 0; round < kRounds; ++round) {
-    const DisturbanceBound found = over(sets.half_widths_until_next(w));
-    if (covers(w.w, found.w)) return w;
+    const PerDirection until_next = sets.half_widths_until_next(w);
+    const DisturbanceBound found = over(until_next);
+    if (covers(w.w, found.w)) return {w, until_next};
     w = larger(w, found);
   }
   PerDirection assumed = sets.half_widths_until_next(w);
   for (int doubling = 0; doubling < kDoublings; ++doubling) {
     for (double& h : assumed) h *= 2;
     w = larger(w, over(assumed));
-    if (covers(assumed, sets.half_widths_until_next(w))) return w;
+    const PerDirection until_next = sets.half_widths_until_next(w);
+    if (covers(assumed, until_next)) return {w, until_next};
   }
-  return w;
+  return {w, sets.half_widths_until_next(w)};
 }
 
 }  // namespace
@@ -162,7 +190,9 @@ ReachTube tube_with_bounds(const Reachability& reach, const State& start, const 
     return pushes.empty() ? Vec3::Zero().eval() : pushes[k];
   };
   const std::vector<State> centers = centres(reach, start, previous, commands, push_at);
-  const auto given = [bounds](std::size_t k, const auto&) { return bounds[k]; };
+  const auto given = [bounds](std::size_t k, const auto& sets) {
+    return Bounded{bounds[k], sets.half_widths_until_next(bounds[k])};
+  };
   return reach.method == Method::paper ? propagate<EllipsoidHalfWidths>(reach, centers, given)
                                        : propagate<ExactHalfWidths>(reach, centers, given);
 }
@@ -174,8 +204,9 @@ ReachTube tube_over_field(const Reachability& reach, const State& start, const S
     return net.held() ? Vec3::Zero().eval() : bounds.push(s.p_W, s.v_W);
   };
   const std::vector<State> centers = centres(reach, start, previous, commands, push_at);
+  LastMaximum last(bounds);
   const auto from_field = [&](std::size_t k, const auto& sets) {
-    return bound_over_set(sets, centers[k], centers[k + 1], bounds, net);
+    return bound_over_set(sets, centers[k], centers[k + 1], bounds, net, last);
   };
   return reach.method == Method::paper ? propagate<EllipsoidHalfWidths>(reach, centers, from_field)
                                        : propagate<ExactHalfWidths>(reach, centers, from_field);

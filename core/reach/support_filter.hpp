@@ -35,6 +35,15 @@ class NewestFirst {
   std::size_t begin_, size_ = 0;
 };
 
+/// Σ_j taps[j]·rows[j] over `count` rows, of 1 or 4 lanes. Real-time: wait-free, no allocation.
+template <std::size_t Lanes>
+std::array<double, Lanes> convolution(const double* taps, const std::array<double, Lanes>* rows,
+                                      std::size_t count) noexcept;
+template <>
+std::array<double, 1> convolution(const double* taps, const std::array<double, 1>* rows, std::size_t count) noexcept;
+template <>
+std::array<double, 4> convolution(const double* taps, const std::array<double, 4>* rows, std::size_t count) noexcept;
+
 /// The convolution Σ_j w̄_{k−1−j} G_j of docs/model.md section 5.2 for `Lanes` sequences that share a response: by the
 /// delay recursion where the response has one, else by the FIR. The response must outlive it.
 template <std::size_t Lanes>
@@ -71,20 +80,7 @@ class SupportFilter {
   Row convolved(const Row& w) noexcept {
     if (bounds_.full()) drop(bounds_.oldest());
     bounds_.push(w);
-    const double* taps = response_->G.data() + 1;
-    const std::size_t used = bounds_.size();
-    // Several partial sums: one would wait for every addition.
-    constexpr std::size_t kSums = Lanes == 1 ? 8 : 2;
-    std::array<Row, kSums> sums{};
-    std::size_t age = 0;
-    for (; age + kSums <= used; age += kSums)
-      for (std::size_t s = 0; s < kSums; ++s)
-        for (std::size_t lane = 0; lane < Lanes; ++lane) sums[s][lane] += taps[age + s] * bounds_[age + s][lane];
-    for (; age < used; ++age)
-      for (std::size_t lane = 0; lane < Lanes; ++lane) sums[0][lane] += taps[age] * bounds_[age][lane];
-    for (std::size_t s = 1; s < kSums; ++s)
-      for (std::size_t lane = 0; lane < Lanes; ++lane) sums[0][lane] += sums[s][lane];
-    return sums[0];
+    return convolution(response_->G.data() + 1, &bounds_[0], bounds_.size());
   }
 
   Row echoed(const Row& w) noexcept {

@@ -147,16 +147,14 @@ void report(benchmark::State& state, const Tally& t, double kernel) {
 
 plan::PlanStart at_rest(const Vec3& p_W) { return {{p_W, Vec3::Zero()}, {p_W, Vec3::Zero(), Vec3::Zero(), 0}}; }
 
-/// Until the first trajectory is verified, as the ancestor's figures are.
-const plan::PlanOptions kFirst{.v_max = kVMax, .a_max = kAMax, .polish = 0};
-const plan::PlanOptions kPolished{.v_max = kVMax, .a_max = kAMax};
+const plan::PlanOptions kOptions{.v_max = kVMax, .a_max = kAMax};
 
 double search_ms(const plan::World& world, const Query& q) {
   const double begun = cpu_ms();
   const plan::SafeView space(world.safe, {world.grid.index(q.start), world.grid.index(q.goal)});
   benchmark::DoNotOptimize(
       plan::search(space, {q.start, Vec3::Zero()}, q.goal,
-                   {0.9 * kVMax, 0.9 * kAMax, kFirst.max_nodes, plan::Clock::now() + std::chrono::seconds(10)}));
+                   {0.9 * kVMax, 0.9 * kAMax, kOptions.max_nodes, plan::Clock::now() + std::chrono::seconds(10)}));
   return cpu_ms() - begun;
 }
 
@@ -191,18 +189,17 @@ Tally planned(const plan::World& world, const std::vector<Query>& queries, const
   return tally;
 }
 
-void forest(benchmark::State& state, const plan::PlanOptions& options) {
+void forest(benchmark::State& state) {
   const auto horizon = static_cast<double>(state.range(0));
   const auto& w = world(horizon > 30 ? 2 : 1);
   std::string refusal;
   for (auto _ : state) {
     const double kernel = kernel_ms(w);
-    report(state, planned(w, queries(w, 200, 0.8 * horizon, horizon), options, refusal), kernel);
+    report(state, planned(w, queries(w, 200, 0.8 * horizon, horizon), kOptions, refusal), kernel);
   }
   state.SetLabel(refusal);
 }
-BENCHMARK_CAPTURE(forest, first, kFirst)->Arg(7)->Arg(20)->Arg(60)->Unit(benchmark::kMillisecond)->Iterations(1);
-BENCHMARK_CAPTURE(forest, polished, kPolished)->Arg(7)->Arg(20)->Arg(60)->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK(forest)->Arg(7)->Arg(20)->Arg(60)->Unit(benchmark::kMillisecond)->Iterations(1);
 
 /// The search alone, 1,000 queries of 5.6 to 7 m, v_max of the argument, mm/s: quantiles and largest, ms. The speeds of
 /// the vehicle's own limit and below are where single queries once took half a second.
@@ -212,7 +209,7 @@ void search_tail(benchmark::State& state) {
   std::vector<double> ms, of_bound;
   for (auto _ : state)
     for (const Query& q : queries(w, 1000, 5.6, 7)) {
-      const plan::SearchOptions options{0.9 * v_max, 0.9 * a_max, kFirst.max_nodes,
+      const plan::SearchOptions options{0.9 * v_max, 0.9 * a_max, kOptions.max_nodes,
                                         plan::Clock::now() + std::chrono::seconds(60)};
       const double begun = cpu_ms();
       const plan::SafeView space(w.safe, {w.grid.index(q.start), w.grid.index(q.goal)});
@@ -265,7 +262,7 @@ void set_extent(benchmark::State& state) {
   std::vector<double> ratio;
   for (auto _ : state)
     for (const Query& q : queries(w, 50, 5.6, 7)) {
-      const auto p = plan::plan(w, at_rest(q.start), q.goal, kPolished);
+      const auto p = plan::plan(w, at_rest(q.start), q.goal, kOptions);
       for (const auto& step : p.tube) {
         const auto& h = step.half_widths;
         const double prism = reach::prism_distance(w.grid, step.center.p_W, h, 0.5);

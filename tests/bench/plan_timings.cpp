@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Plans the pairs of a race file (../shared/data/race/README.md: start and goal of each pair) and tells what each stage
-// costs: CPU ms of the thread, the median of five calls a pair, until the first verified trajectory and polished by
-// turns; instructions where the kernel counts them.
-//   plan_timings --pairs FILE [--v V] [--json]
+// costs: CPU ms of the thread, the median of five calls a pair; instructions where the kernel counts them.
+//   plan_timings --pairs FILE [--v V] [--calls N] [--json]
 #include <linux/perf_event.h>
 #include <sys/ioctl.h>
 #include <sys/syscall.h>
@@ -10,7 +9,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -90,10 +88,12 @@ Json quantiles(std::vector<double> x) {
 int main(int argc, char** argv) {
   std::string pairs;
   double v_max = 1.5;
+  int calls = 5;
   bool json = false;
   for (int k = 1; k < argc; ++k) {
     if (std::strcmp(argv[k], "--pairs") == 0 && k + 1 < argc) pairs = argv[++k];
     if (std::strcmp(argv[k], "--v") == 0 && k + 1 < argc) v_max = std::atof(argv[++k]);
+    if (std::strcmp(argv[k], "--calls") == 0 && k + 1 < argc) calls = std::atoi(argv[++k]);
     if (std::strcmp(argv[k], "--json") == 0) json = true;
   }
   const auto [map, queries] = read_pairs(pairs);
@@ -106,48 +106,38 @@ int main(int argc, char** argv) {
                                        config::load_vehicle("builtin:quad-5in").value());
   const Instructions instructions;
   Json told = {{"map", map}, {"pairs", queries.size()}, {"v_max_mps", v_max}};
-  const std::array<std::pair<const char*, std::size_t>, 2> ways{{{"first", 0}, {"polished", 400}}};
-  std::map<std::string, std::map<std::string, std::vector<double>>> found;
+  std::map<std::string, std::vector<double>> found;
   for (const auto& q : queries) {
-    std::map<std::string, std::map<std::string, std::vector<double>>> calls;
-    for (int call = 0; call < 5; ++call)
-      for (const auto& [name, polish] : ways) {
-        Setpoint hover;
-        hover.p_W = q.start;
-        plan::PlanOptions options{.v_max = v_max, .a_max = 2};
-        options.polish = polish;
-        const double begun = cpu_ms(), counted = instructions.now();
-        const auto plan = plan::plan(*world, {{q.start, Vec3::Zero()}, hover}, q.goal, options);
-        auto& c = calls[name];
-        if (counted >= 0) c["instructions"].push_back(instructions.now() - counted);
-        c["total_ms"].push_back(cpu_ms() - begun);
-        if (plan.status != plan::PlanStatus::ok) continue;
-        const auto& m = plan.metrics;
-        for (const auto& [what, value] : {std::pair{"search_ms", m.search_ms},
-                                          {"tubes_ms", m.tubes_ms},
-                                          {"optimise_ms", m.optimise_ms},
-                                          {"verify_ms", m.verify_ms},
-                                          {"evaluations", static_cast<double>(m.evaluations)},
-                                          {"time_s", m.time_s},
-                                          {"jerk2_time5", m.jerk2 * std::pow(m.time_s, 5)},
-                                          {"clearance_m", m.min_clearance_m}})
-          c[what].push_back(value);
-      }
-    for (auto& [name, measured] : calls) {
-      if (!measured.contains("time_s")) continue;
-      for (auto& [what, values] : measured) found[name][what].push_back(quantile(values, 0.5));
+    std::map<std::string, std::vector<double>> measured;
+    for (int call = 0; call < calls; ++call) {
+      Setpoint hover;
+      hover.p_W = q.start;
+      const double begun = cpu_ms(), counted = instructions.now();
+      const auto plan = plan::plan(*world, {{q.start, Vec3::Zero()}, hover}, q.goal, {.v_max = v_max, .a_max = 2});
+      if (counted >= 0) measured["instructions"].push_back(instructions.now() - counted);
+      measured["total_ms"].push_back(cpu_ms() - begun);
+      if (plan.status != plan::PlanStatus::ok) continue;
+      const auto& m = plan.metrics;
+      for (const auto& [what, value] : {std::pair{"search_ms", m.search_ms},
+                                        {"tubes_ms", m.tubes_ms},
+                                        {"optimise_ms", m.optimise_ms},
+                                        {"verify_ms", m.verify_ms},
+                                        {"evaluations", static_cast<double>(m.evaluations)},
+                                        {"time_s", m.time_s},
+                                        {"jerk2_time5", m.jerk2 * std::pow(m.time_s, 5)},
+                                        {"clearance_m", m.min_clearance_m}})
+        measured[what].push_back(value);
     }
+    if (!measured.contains("time_s")) continue;
+    for (auto& [what, values] : measured) found[what].push_back(quantile(values, 0.5));
   }
-  for (const auto& [name, polish] : ways) {
-    Json row = {{"solved", found[name]["time_s"].size()}};
-    for (const auto& [what, values] : found[name]) row[what] = quantiles(values);
-    double flown = 0, jerk = 0;
-    for (const double t : found[name]["time_s"]) flown += t;
-    for (const double j : found[name]["jerk2_time5"]) jerk += std::log(j) / static_cast<double>(queries.size());
-    row["flight_time_sum_s"] = flown;
-    row["mean_ln_jerk2_time5"] = jerk;
-    told[name] = row;
-  }
+  told["solved"] = found["time_s"].size();
+  for (const auto& [what, values] : found) told[what] = quantiles(values);
+  double flown = 0, jerk = 0;
+  for (const double t : found["time_s"]) flown += t;
+  for (const double j : found["jerk2_time5"]) jerk += std::log(j) / static_cast<double>(queries.size());
+  told["flight_time_sum_s"] = flown;
+  told["mean_ln_jerk2_time5"] = jerk;
   std::printf("%s\n", told.dump(json ? -1 : 2).c_str());
   return 0;
 }

@@ -59,17 +59,11 @@ std::vector<double> bytes_per_voxel(const map::OccupancyGrid& grid) {
   const auto all = static_cast<double>(held - before);
   const auto copy = [](const auto& structure) { return bytes_of([&] { return structure; }); };
   const double distance = bytes_of([&] { return map::DistanceField(world->grid); });
-  const double rest = distance + copy(world->grid) + copy(world->hover) + copy(world->reach) + copy(world->response);
+  const double rest = distance + copy(world->grid) + copy(world->hover) + copy(world->reach);
   const double sums = bytes_of([&] { return map::OccupancySums(world->grid); });
   const double safe = bytes_of([&] { return SafeSpace(world->hover.safe_voxels()); });
-  std::vector<double> bytes = {all - rest - sums - safe,
-                               distance,
-                               sums,
-                               safe,
-                               copy(world->grid),
-                               copy(world->hover),
-                               copy(world->reach) + copy(world->response),
-                               all};
+  std::vector<double> bytes = {all - rest - sums - safe, distance,           sums, safe, copy(world->grid),
+                               copy(world->hover),       copy(world->reach), all};
   for (double& b : bytes) b /= static_cast<double>(world->grid.cell_count());
   return bytes;
 }

@@ -21,10 +21,10 @@ const World& open_world() {
 
 PlanStart moving(const Vec3& p_W, const Vec3& v_W) { return {{p_W, v_W}, {p_W, v_W, Vec3::Zero(), 0}}; }
 
-// Short ways from a fast start are those that no timing suits; an optimiser that hardly runs leaves the rest to it.
-TEST(Refinement, WhatPlansReturnKeepsTheLimitsFromAnyMotionEvenHardlyOptimised) {
+// Short ways from a fast start are those that no timing suits.
+TEST(Refinement, WhatPlansReturnKeepsTheLimitsFromAnyMotion) {
   const Vec3 from(0, 0, 1.2);
-  const PlanOptions options{.v_max = 1.5, .a_max = 1.0, .evaluations = 1, .polish = 0};
+  const PlanOptions options{.v_max = 1.5, .a_max = 1.0};
   int flown = 0;
   for (const Vec3& v : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(-1, 0, 0), Vec3(0, 0.8, 0), Vec3(0.7, -0.7, 0)})
     for (const Vec3& goal : {Vec3(2, 0, 1.2), Vec3(1, 0.6, 1.4), Vec3(0.6, 0, 1.2), Vec3(-0.6, 0.4, 1)}) {
@@ -42,55 +42,22 @@ TEST(Refinement, WhatPlansReturnKeepsTheLimitsFromAnyMotionEvenHardlyOptimised) 
   EXPECT_GT(flown, 5);
 }
 
-// A round that ends early may leave a curve that is worse than what was found before it.
-TEST(Refinement, PolishingReturnsNothingThatCostsMoreThanWhatWasFoundWithoutIt) {
-  const auto cost = [](const BSpline& s) { return s.jerk2() * std::pow(s.duration(), 5); };
-  int flown = 0, better = 0;
-  for (const Vec3& v : {Vec3(0, 0, 0), Vec3(0.8, 0.3, 0), Vec3(-0.5, 0.5, 0)})
-    for (const Vec3& goal : {Vec3(2, 0, 1.2), Vec3(1, 1.2, 1.6)}) {
-      const auto planned = [&](std::size_t polish) {
-        return plan(open_world(), moving({-1.5, 0, 1.2}, v), goal,
-                    {.v_max = 1.5, .a_max = 1.5, .evaluations = 4, .polish = polish});  // so few leave work undone
-      };
-      const Plan rough = planned(0);
-      if (rough.status != PlanStatus::ok) continue;
-      for (const std::size_t polish : {1U, 2U, 3U, 5U, 8U, 20U}) {
-        const Plan polished = planned(polish);
-        ASSERT_EQ(polished.status, PlanStatus::ok);
-        EXPECT_LE(cost(polished.trajectory), cost(rough.trajectory) * (1 + 1e-9))  // another pace rounds otherwise
-            << goal.transpose() << " polished " << polish;
-        ++flown;
-        better += cost(polished.trajectory) < (1 - 1e-6) * cost(rough.trajectory);
-      }
-    }
-  EXPECT_GT(flown, 20);
-  EXPECT_GT(better, 0);
-}
-
-// The searched pace is that of a cubic: what polishing smooths need not take as long.
-TEST(Refinement, PolishedTrajectoriesFromRestTakeAsLittleTimeAsTheLimitsAndTheirTubeAllow) {
+// The searched pace is that of a cubic: a smoother curve need not take as long.
+TEST(Refinement, TrajectoriesFromRestTakeAsLittleTimeAsTheLimitsAllow) {
   const double v_max = 1.5, a_max = 1.5;
-  int at_limit = 0, quicker = 0;
   for (const Vec3& goal : {Vec3(2, 0, 1.2), Vec3(1, 1.2, 1.6), Vec3(-0.5, 0.3, 1.2), Vec3(-1.2, -0.8, 1.0)}) {
-    const auto planned = [&](std::size_t polish) {
-      return plan(open_world(), moving({-1.5, 0, 1.2}, Vec3::Zero()), goal,
-                  {.v_max = v_max, .a_max = a_max, .polish = polish});
-    };
-    const Plan rough = planned(0), polished = planned(400);
-    ASSERT_EQ(polished.status, PlanStatus::ok);
-    EXPECT_GT(nearest_approach(open_world(), polished.tube).clearance, 0);
+    const Plan p = plan(open_world(), moving({-1.5, 0, 1.2}, Vec3::Zero()), goal, {.v_max = v_max, .a_max = a_max});
+    ASSERT_EQ(p.status, PlanStatus::ok);
+    EXPECT_GT(nearest_approach(open_world(), p.tube).clearance, 0);
     double used = 0;
-    for (double t = 0; t <= polished.trajectory.duration(); t += 0.005) {
-      const double v = polished.trajectory.derivative(t, 1).cwiseAbs().maxCoeff() / v_max;
-      const double a = polished.trajectory.derivative(t, 2).cwiseAbs().maxCoeff() / a_max;
+    for (double t = 0; t <= p.trajectory.duration(); t += 0.005) {
+      const double v = p.trajectory.derivative(t, 1).cwiseAbs().maxCoeff() / v_max;
+      const double a = p.trajectory.derivative(t, 2).cwiseAbs().maxCoeff() / a_max;
       used = std::max({used, v, a});
     }
     EXPECT_LE(used, 1 + 1e-6);
-    at_limit += used > 0.97;
-    quicker += polished.trajectory.duration() < 0.95 * rough.trajectory.duration();
+    EXPECT_GT(used, 0.97);
   }
-  EXPECT_EQ(at_limit, 4);
-  EXPECT_GE(quicker, 2);
 }
 
 // Of 900 pairs in three scenes the one whose tube touches, by 0.7 mm, at the pace that the limits alone would let it

@@ -161,8 +161,7 @@ Worlds::Worlds(const Place& place, const Vehicle& vehicle, const Parallel& paral
     : place_(place),
       voxels_(plan::voxels_for_centre(place.grid, place.distance, vehicle, map::all_of(place.grid.size()))),
       field_(place.grid, voxels_),
-      reach_(plan::sets_of(vehicle, reach::Method::tight)),
-      response_(vehicle, reach_.loop) {
+      reach_(plan::sets_of(vehicle, reach::Method::tight)) {
   const field::WholeField whole(place.grid, plan::with_vehicle(Model{}, vehicle), voxels_);
   parallel(whole.block_count(), [&](std::size_t begin, std::size_t end) { field_.fill(whole, begin, end); });
 }
@@ -190,7 +189,6 @@ plan::World Worlds::make(const Calibrated& air, const Way& way, const Parallel& 
           .hover = std::move(hover),
           .safe = std::move(safe),
           .reach = reach_,
-          .response = response_,
           .constant_margin = way.margin};
 }
 
@@ -198,7 +196,7 @@ plan::Plan planned(const plan::World& world, const sim::RoutePair& pair, double 
   Setpoint hover;
   hover.p_W = pair.start_W;
   return plan::plan(world, {{hover.p_W, Vec3::Zero()}, hover}, pair.goal_W,
-                    {.v_max = v_max, .a_max = 2, .deadline_s = 1e6, .max_nodes = 40'000, .polish = 50});
+                    {.v_max = v_max, .a_max = 2, .deadline_s = 1e6, .max_nodes = 40'000});
 }
 
 }  // namespace backwash::race

@@ -63,7 +63,6 @@ class Worlds {
   std::vector<std::size_t> voxels_;
   field::DisturbanceField field_;
   reach::Reachability reach_;
-  plan::CentreResponse response_;
 };
 
 /// The plan of a pair, from rest.

@@ -7,25 +7,24 @@
 #include <utility>
 
 #include "core/plan/rest.hpp"
+#include "core/plan/spline/least_jerk.hpp"
 
 namespace backwash::plan {
 
 namespace {
 
-constexpr double kOptimiseShare = 0.97;              ///< of the limits: re-timing has little left to do
-constexpr double kFirstMargin = 0.02;                ///< m beyond the tube, in the collision cost of the first round
-constexpr double kMoreMargin = 0.02;                 ///< m, after each round that fails verification
-constexpr std::size_t kFailures = 4;                 ///< of verification, per pace
-constexpr double kWorthwhile = 0.005;                ///< share of the cost that a round of polishing must gain
-constexpr double kQuickenings[] = {1.0, 0.5, 0.25};  ///< share of what the limits leave
-constexpr double kPaces[] = {1.0, 0.7, 0.45};        ///< share of the searched path's speed
+constexpr double kOptimiseShare = 0.97;        ///< of the limits: re-timing has little left to do
+constexpr double kFirstMargin = 0.02;          ///< m beyond the set, in the first round
+constexpr double kMoreMargin = 0.02;           ///< m, after each round that fails verification
+constexpr int kTries = 4;                      ///< per pace
+constexpr double kPaces[] = {1.0, 0.7, 0.45};  ///< share of the searched path's speed, and of the limit
 
 /// Time between control points: 0.6 m of flight at full speed. Half of it costs 0.7 times more and smooths no better.
 double knot_span(double v_max) { return std::clamp(0.6 / v_max, 0.15, 0.6); }
 
 BSpline fit_path(const std::vector<Motion>& motions, const PlanStart& start, const Vec3& goal_W, double v_max,
                  double pace) {
-  PathSamples samples = sample(motions, pace * knot_span(v_max * pace));
+  PathSamples samples = sample(motions, pace * knot_span(v_max));
   samples.positions.front() = start.command.p_W;
   samples.positions.back() = goal_W;
   return fit(samples.positions, samples.step / pace, start.command.v_W, start.command.a_W, Vec3::Zero(), Vec3::Zero());
@@ -51,7 +50,14 @@ BSpline with_knot_span(BSpline spline, const PlanStart& start, double knot_span)
   return spline;
 }
 
+/// The same curve as fast as the limits let it be. From a motion another pace is another curve: slower alone, where it
+/// must be.
 BSpline retimed(BSpline spline, const PlanStart& start, const MotionLimits& limits) {
+  const bool at_rest = start.command.v_W.isZero(0) && start.command.a_W.isZero(0);
+  if (at_rest) {
+    const double quickest = stretch_needed(spline, limits) * spline.knot_span;
+    spline = with_knot_span(std::move(spline), start, std::max(quickest, kControlPeriod));
+  }
   for (int i = 0; i < 30; ++i) {
     const double stretch = stretch_needed(spline, limits);
     if (stretch <= 1) break;
@@ -83,9 +89,6 @@ std::string too_risky(const World& world, const reach::Risk& risk) {
   return buffer;
 }
 
-/// What ∫‖p⃛‖² dt is when every trajectory takes the same time.
-double jerk2_at_equal_time(const BSpline& spline) { return spline.jerk2() * std::pow(spline.duration(), 5); }
-
 class Refiner {
  public:
   Refiner(const World& world, const PlanStart& start, const PlanOptions& options, Clock::time_point deadline)
@@ -96,57 +99,27 @@ class Refiner {
         limits_{Vec3::Constant(options.v_max), start.command.a_W.cwiseAbs().cwiseMax(options.a_max),
                 start.command.v_W} {}
 
-  /// Rounds from one spline, and what they keep as fast as it may be.
-  void run(BSpline spline) {
-    polish(std::move(spline));
-    if (options_.polish > 0 && result_.found) quicken();
+  /// Rounds from the searched path's spline: about hover sets first, then about the sets of what failed. The last is
+  /// that spline itself: it lies where hovering is safe.
+  void run(const BSpline& path, double pace) {
+    const MotionLimits limits{pace * limits_.v, pace * pace * limits_.a, limits_.v_start};
+    std::optional<Refined> failed;
+    for (int round = 0; round < kTries; ++round) {
+      result_.out_of_time = Clock::now() > deadline_;
+      if (result_.out_of_time) return;
+      const double margin = kFirstMargin + round * kMoreMargin;
+      const BSpline& begun = failed ? failed->trajectory : path;
+      Refined candidate = fly(retimed(round + 1 < kTries ? optimised(begun, failed, margin) : path, start_, limits));
+      if (verified(candidate)) {
+        result_.found = std::move(candidate);
+        return;
+      }
+      failed = std::move(candidate);
+    }
   }
   const Refinement& result() const noexcept { return result_; }
 
  private:
-  void polish(BSpline spline) {
-    reach::ReachTube tube = fly(spline).tube;
-    std::size_t polish = options_.polish;
-    double margin = kFirstMargin;
-    for (std::size_t failures = 0; failures < kFailures;) {
-      result_.out_of_time = Clock::now() > deadline_;
-      if (result_.out_of_time) return;
-      const bool polishing = result_.found.has_value();
-      const auto round = optimised(spline, tube, margin, polishing ? polish : options_.evaluations);
-      if (polishing) polish -= std::min(polish, round.evaluations);
-      spline = retimed(round.spline, start_, limits_);
-      Refined candidate = fly(spline);
-      if (!verified(candidate)) {
-        ++failures;
-        margin += kMoreMargin;
-        tube = candidate.tube;
-      } else {
-        // An unfinished curve may need more time than it will in the end: polished at the pace it had.
-        const bool slowed = spline.knot_span > round.spline.knot_span;
-        if (slowed) spline = round.spline;
-        tube = slowed && polish > 0 ? fly(spline).tube : candidate.tube;
-        if (!keep(std::move(candidate)) || round.converged) return;
-      }
-      if (result_.found && polish == 0) return;
-    }
-  }
-
-  /// Less time for the same curve, up to the limits: the most of it that is verified. From a motion another pace is
-  /// another curve, taken if it costs no more.
-  void quicken() {
-    const BSpline polished = result_.found->trajectory;
-    const double most = 1 - stretch_needed(polished, limits_);
-    for (const double share : kQuickenings) {
-      if (share * most < kWorthwhile || Clock::now() > deadline_) return;
-      const double knot_span = (1 - share * most) * polished.knot_span;
-      Refined candidate = fly(retimed(with_knot_span(polished, start_, knot_span), start_, limits_));
-      if (jerk2_at_equal_time(candidate.trajectory) > (1 + 1e-9) * jerk2_at_equal_time(polished)) return;
-      if (!verified(candidate)) continue;
-      result_.found = std::move(candidate);
-      return;
-    }
-  }
-
   Refined fly(const BSpline& spline) {
     const auto begun = Clock::now();
     Refined flight{spline, spline.commands(), {}, 0};
@@ -156,14 +129,15 @@ class Refiner {
     return flight;
   }
 
-  OptimizerResult optimised(const BSpline& spline, const reach::ReachTube& tube, double margin,
-                            std::size_t evaluations) {
-    const auto begun = Clock::now();
-    const SplineCost cost(world_, spline, tube, margin, limits_.scaled(kOptimiseShare), {}, options_.norm_cost);
-    auto optimum = optimise(cost, std::min(evaluations, options_.evaluations), deadline_);
-    result_.optimise_ms += ms_since(begun);
-    result_.evaluations += optimum.evaluations;
-    return optimum;
+  BSpline optimised(const BSpline& begun, const std::optional<Refined>& failed, double margin) {
+    const auto from = Clock::now();
+    std::optional<Flown> flown;
+    if (failed) flown.emplace(Flown{failed->trajectory, failed->tube});
+    auto optimum = least_jerk(world_, begun, flown ? &*flown : nullptr, margin, limits_.scaled(kOptimiseShare),
+                              options_.norm_cost);
+    result_.optimise_ms += ms_since(from);
+    result_.evaluations += optimum.steps;
+    return std::move(optimum.curve);
   }
 
   bool verified(Refined& candidate) {
@@ -182,14 +156,6 @@ class Refiner {
     return false;
   }
 
-  /// Keeps what costs less; whether it does by as much as a round is worth.
-  bool keep(Refined candidate) {
-    const double now = result_.found ? jerk2_at_equal_time(result_.found->trajectory) : INFINITY;
-    const double then = jerk2_at_equal_time(candidate.trajectory);
-    if (then < now) result_.found = std::move(candidate);
-    return then < (1 - kWorthwhile) * now;
-  }
-
   const World& world_;
   const PlanStart& start_;
   const PlanOptions& options_;
@@ -204,7 +170,7 @@ Refinement refine(const World& world, const std::vector<Motion>& path, const Pla
                   const PlanOptions& options, Clock::time_point deadline) {
   Refiner refiner(world, start, options, deadline);
   for (const double pace : kPaces) {
-    refiner.run(fit_path(path, start, goal_W, options.v_max, pace));
+    refiner.run(fit_path(path, start, goal_W, options.v_max, pace), pace);
     if (refiner.result().found || refiner.result().out_of_time) break;
   }
   return refiner.result();

@@ -28,11 +28,8 @@ struct Refinement {
 
 /// Path of a search → spline → rounds of optimisation, re-timing and verification of the whole swept tube
 /// (docs/model.md section 5b), at the searched pace and, if nothing passes, at slower ones. What fails is optimised
-/// again about its own tube with a larger margin. The first that passes is kept, and polished on from its own tube
-/// until the optimiser has converged, a round gains less than 0.5 %, or `options.polish` evaluations are spent: of all
-/// that pass, the one with the least jerk² at equal time, ∫‖p⃛‖² dt · T⁵, is returned, as fast as the limits let it be
-/// where that passes, too (not with `options.polish` 0). Deterministic but for the deadline. Precondition: the path
-/// starts at the command and ends at rest at the goal.
+/// again about its own tube with a larger margin. The first that passes is returned, as fast as the limits let it be.
+/// Deterministic but for the deadline. Precondition: the path starts at the command and ends at rest at the goal.
 Refinement refine(const World& world, const std::vector<Motion>& path, const PlanStart& start, const Vec3& goal_W,
                   const PlanOptions& options, Clock::time_point deadline);
 

@@ -134,7 +134,6 @@ World in_air(World world, const AirFactors& factors, const Parallel& parallel) {
 /// The third stage takes a vehicle's loop, which reaches all places to hover.
 World clear_by(World world, Clearance clearance) {
   world.reach = std::move(clearance.reach);
-  world.response = CentreResponse(world.reach.vehicle, world.reach.loop);
   world.constant_margin = clearance.margin;
   return world;
 }
@@ -250,9 +249,8 @@ World unbuilt_world(map::OccupancyGrid grid, const Model& model, const Vehicle& 
   reach::HoverMap hover(none);  // made when the bounds are, which need room themselves
   SafeSpace safe(none);
   reach::Reachability reach = sets_of(vehicle, method);
-  CentreResponse response(vehicle, reach.loop);
-  return {std::move(of_vehicle), std::move(grid), std::move(distance), std::move(sums),     std::move(bounds),
-          std::move(hover),      std::move(safe), std::move(reach),    std::move(response), constant_margin};
+  return {std::move(of_vehicle), std::move(grid), std::move(distance), std::move(sums), std::move(bounds),
+          std::move(hover),      std::move(safe), std::move(reach),    constant_margin};
 }
 
 std::shared_ptr<const World> rebuilt(World world, Change change, const Parallel& parallel) {

@@ -10,7 +10,6 @@
 #include "core/map/occupancy_grid.hpp"
 #include "core/map/occupancy_sums.hpp"
 #include "core/map/voxel_box.hpp"
-#include "core/plan/spline/centre_response.hpp"
 #include "core/plan/world/air_scale.hpp"
 #include "core/plan/world/safe_space.hpp"
 #include "core/reach/hover_set.hpp"
@@ -30,7 +29,7 @@ Model with_vehicle(const Model& model, const Vehicle& vehicle);
 reach::Reachability sets_of(const Vehicle& vehicle, reach::Method method);
 
 /// Immutable picture of the surroundings for one vehicle: everything the planner and the checks read. It is made in
-/// stages, each of what stands before it: map (grid, distance, sums), air (bounds, air), sets (reach, response,
+/// stages, each of what stands before it: map (grid, distance, sums), air (bounds, air), sets (reach,
 /// constant_margin), places to hover (hover, safe). rebuilt() makes each anew where a change reaches it.
 struct World {
   Model model;  ///< with the vehicle's r0
@@ -41,7 +40,6 @@ struct World {
   reach::HoverMap hover;
   SafeSpace safe;  ///< where hover.safe()
   reach::Reachability reach;
-  CentreResponse response;                ///< of the predicted motion, for the optimiser
   std::optional<double> constant_margin;  ///< m: a ball in place of the reachable sets
   AirScale air{};                         ///< what bounds and hover map hold beside the model
 };

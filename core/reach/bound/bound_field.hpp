@@ -91,13 +91,14 @@ class BoundField {
   DisturbanceBound max_over(const Vec3& low_W, const Vec3& high_W) const noexcept;
   /// The same over the voxels from low to high, both included; what lies outside the grid counts as 0.
   DisturbanceBound max_over_voxels(Index3 low, Index3 high) const noexcept;
+  /// The voxels, closed cubes, that meet a closed box, m in W; an empty box if none does.
+  map::VoxelBox meeting(const Vec3& low_W, const Vec3& high_W) const noexcept;
   /// w̄ at a voxel's centre, m/s²; 0 outside the grid.
   DisturbanceBound at(const Index3& v) const noexcept;
 
  private:
   static constexpr int kFew = 512;  // voxels
   bool inside(const Index3& v) const noexcept { return map::inside(tiles_.size(), v); }
-  map::VoxelBox meeting(const Vec3& low_W, const Vec3& high_W) const noexcept;
   DisturbanceBound moving(DisturbanceBound w, const Vec3& v_W) const noexcept;
   BoundCodes coded(std::size_t n, const Variance& sigma) const noexcept;
   void update_pushes();

@@ -227,7 +227,7 @@ FlownWay flown_way(const plan::World& world, const Vec3& start_W, const Way& way
     if (const auto why = plan::why_no_rest(world, p.p_W, 0)) return refused(*why);
   const auto& limits = world.reach.vehicle.limits;
   const plan::PlanOptions options{
-      .v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kDesignRules.design_plan_deadline, .polish = 0};
+      .v_max = limits.v_max, .a_max = limits.a_max, .deadline_s = kDesignRules.design_plan_deadline};
   const auto most = static_cast<std::size_t>(flight_time / kControlPeriod);
   const std::size_t around = way.points.size();
   const bool facing = std::ranges::any_of(way.points, [](const Waypoint& p) { return p.yaw.has_value(); });
