@@ -210,6 +210,36 @@ TEST(NearestApproach, FindsTheOneStepThatTouches) {
   EXPECT_NEAR(nearest.t, 1.2, 1e-12);
 }
 
+// Steps are looked at together and left out by bounds: against every step by itself, on flights that turn and widen.
+TEST(NearestApproach, IsTheLeastOfAllSteps) {
+  const World& world = gap_world();
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(0, 1);
+  int touching = 0;
+  for (int draw = 0; draw < 300; ++draw) {
+    const Vec3 middle(0.5 + 5 * unit(random), 0.5 + 3 * unit(random), 0.4 + 0.8 * unit(random));
+    const double turn = 8 * unit(random), reach = 0.5 * unit(random), widest = 0.25 * unit(random);
+    reach::ReachTube tube;
+    for (std::size_t k = 0; k < 70; ++k) {
+      const double t = 0.02 * static_cast<double>(k);
+      const Vec3 p = middle + reach * Vec3(std::cos(turn * t), std::sin(turn * t), std::sin(3 * turn * t));
+      PerDirection h;
+      for (double& half : h) half = widest * (0.7 + 0.3 * unit(random));
+      tube.push_back({t, {p, Vec3::Zero()}, {}, h, h, {}, 0});
+    }
+    double least = 2 + reach::body_and_estimation(world.reach.vehicle);
+    for (std::size_t k = 0; k < tube.size(); ++k)
+      least = std::min(least, reach::swept_prism_distance(world.grid, tube[k].center.p_W,
+                                                          tube[std::min(k + 1, tube.size() - 1)].center.p_W,
+                                                          tube[k].half_widths_interval, least));
+    const double clearance = least - reach::body_and_estimation(world.reach.vehicle);
+    touching += clearance <= 0;
+    EXPECT_NEAR(nearest_approach(world, tube).clearance, clearance, 1e-9) << draw;
+  }
+  EXPECT_GT(touching, 20);
+  EXPECT_LT(touching, 280);
+}
+
 TEST(TakeoffColumn, FindsTheFloorAndTheLowestClearHover) {
   const World& world = gap_world();
   const auto column = takeoff_column(world, {1.5, 1.5, 0.3}, 0);
