@@ -29,9 +29,10 @@ case $arch in
 esac
 install_packages toolchains/packages.$arch.txt
 
-# The headers and libraries of packages.txt for that architecture. Co-installation fails: files of octomap's CMake package collide.
+# The headers and libraries of packages.txt, and of the tests of core and bridge, for that architecture. Co-installation fails:
+# files of octomap's CMake package collide.
 sysroot=$PWD/build/sysroot-$arch
-wanted=$(sed 's/#.*//' packages.txt | grep -E -- '-dev *$' | xargs | tr ' ' ',')
+wanted=$(sed 's/#.*//' packages.txt | grep -E -- '-dev *$' | xargs | tr ' ' ','),libgtest-dev,libgmock-dev,libfastrtps-dev
 # fetched [ARCHIVE …]: default, those of this machine's Debian.
 fetched() {
   rm -rf "$sysroot"

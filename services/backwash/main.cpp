@@ -20,8 +20,8 @@ Verb elsewhere(Command& app, const char* name, const char* about) {
   return {&app.add_subcommand(name, std::string(about) + " (source tree alone)"), [name]() -> int {
             throw Failure(backwash::kUnavailable,
                           program(name) +
-                              ":1: is not there; build the source tree (./fly), and run the backwash "
-                              "of its build/release/services");
+                              ":1: is not there; build the source tree (cmake --build --preset release), and run the "
+                              "backwash of its build/release/services");
           }};
 }
 

@@ -7,6 +7,7 @@ set -euo pipefail
 cd "$(dirname "$(realpath "${BASH_SOURCE[0]}")")/../.."
 source ./setup.sh
 install_packages packages.txt
+install_packages tests/packages.txt
 build_preset release --target test_promises
 first=${1:-0} last=${2:-${1:-999}}
 export done_file=${BACKWASH_PROMISES_DONE:-promises-$(git rev-parse --short HEAD).done}

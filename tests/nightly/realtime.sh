@@ -10,6 +10,7 @@ source ./setup.sh
 out=$PWD/build/nightly
 mkdir -p "$out"
 install_packages packages.txt
+install_packages tests/packages.txt
 
 # build DIR TARGET… -- CMAKE_OPTION…
 build() {

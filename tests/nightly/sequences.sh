@@ -6,6 +6,7 @@ set -euo pipefail
 cd "$(dirname "$(realpath "${BASH_SOURCE[0]}")")/../.."
 source ./setup.sh
 install_packages packages.txt
+install_packages tests/packages.txt
 build_preset release --target test_sequence_fuzz
 export BACKWASH_FUZZ_TICKS=${BACKWASH_FUZZ_TICKS:-1e8} BACKWASH_FUZZ_SEED=${BACKWASH_FUZZ_SEED:-$(date +%s)000}
 export BACKWASH_FUZZ_REPORTS=${BACKWASH_FUZZ_REPORTS:-1000}

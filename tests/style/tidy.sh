@@ -7,6 +7,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 source ./setup.sh
 install_packages packages.txt
+install_packages tests/packages.txt
 install_packages tests/style/packages.txt
 join=OFF checks=
 [[ $# -gt 0 ]] || join=ON checks=-bugprone-suspicious-include  # a joined unit includes sources
