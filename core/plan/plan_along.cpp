@@ -22,7 +22,11 @@ constexpr double kLonger = 1.1;  ///< length of a plan over that of the way, wit
 class Known {
  public:
   Known(const map::OccupancyGrid& map, const Vehicle& vehicle, const PlanStart& start, const Vec3& goal_W)
-      : map_(map), ends_{start.command.p_W, goal_W}, hops_(map.cell_count(), kNever), space_(places(vehicle)) {
+      : map_(map),
+        distance_(map),
+        ends_{start.command.p_W, goal_W},
+        hops_(map.cell_count(), kNever),
+        space_(places(vehicle)) {
     by_ = Index3::Constant(static_cast<int>(std::ceil(vehicle.body.radius / map.resolution())) + 2);
     for (const Vec3& end : ends_) seed(end);
   }
@@ -94,6 +98,17 @@ class Known {
     if (!changed.empty()) space_.update(places_, changed);
   }
 
+  /// A plan as the whole map measures it: what was not made is no obstacle there. `apart`: as in risk_of(), m.
+  Plan measured(const World& world, Plan plan, double apart) const {
+    if (plan.status != PlanStatus::ok) return plan;
+    World whole = world;  // its obstacles: of the rest nothing is read
+    whole.grid = map_;
+    whole.distance = distance_;
+    plan.metrics.min_clearance_m = nearest_approach(whole, plan.tube).clearance;
+    plan.metrics.risk = risk_of(whole, plan.tube, 0, apart);
+    return plan;
+  }
+
   static constexpr double kNone = std::numeric_limits<double>::infinity();
 
  private:
@@ -101,12 +116,11 @@ class Known {
 
   /// Fills hops_ and places_: a hover-safe place is farther from obstacles than body and estimation reach.
   const map::OccupancyGrid& places(const Vehicle& vehicle) {
-    const map::DistanceField distance(map_);
     const double taken = reach::body_and_estimation(vehicle);
-    for (const std::size_t n : voxels_for_centre(map_, distance, vehicle, map::all_of(map_.size()))) {
+    for (const std::size_t n : voxels_for_centre(map_, distance_, vehicle, map::all_of(map_.size()))) {
       hops_[n] = kUnreached;
       const Index3 v = map_.voxel(n);
-      if (distance.at(v) > taken) places_.set(v, map::Cell::free);
+      if (distance_.at(v) > taken) places_.set(v, map::Cell::free);
     }
     return places_;
   }
@@ -135,6 +149,7 @@ class Known {
   }
 
   const map::OccupancyGrid& map_;
+  map::DistanceField distance_;
   std::array<Vec3, 2> ends_;
   Index3 by_ = Index3::Zero();       // voxels beyond a place that its distance to obstacles may ask for
   std::vector<std::uint16_t> hops_;  // from the ways, king's moves through places for the centre; kNever: it is none
@@ -156,11 +171,11 @@ Plan plan_along(const map::OccupancyGrid& map, const Model& model, const Vehicle
     const bool all = known.reach(metres);
     const auto world = make(known.part(), &map);
     Plan found = plan(*world, start, goal_W, options);
-    if (all || way == Known::kNone) return found;
+    if (all || way == Known::kNone) return known.measured(*world, std::move(found), options.least_clearance_m);
     known.learn(*world, metres);
     way = known.take_way();
     if (way == Known::kNone || (found.status == PlanStatus::ok && found.metrics.length_m <= kLonger * way))
-      return found;
+      return known.measured(*world, std::move(found), options.least_clearance_m);
   }
 }
 
