@@ -24,24 +24,19 @@ std::size_t find_near(const Standing& segments, std::uint32_t first, std::uint32
                       std::uint32_t* found) noexcept {
   constexpr std::uint32_t kLanes = 16;
   const auto dy = static_cast<float>(looking.dy);
+  std::array<std::uint8_t, kLanes> near;
   std::size_t count = 0;
-  for (std::uint32_t n = first; n < end; n += kLanes) {
-    Ints x, low, high;
-    Floats m_x, m_y;
-    load(x, segments.x + n);
-    load(low, segments.low + n);
-    load(high, segments.high + n);
-    load(m_x, segments.m_x + n);
-    load(m_y, segments.m_y + n);
-    const Floats dx = __builtin_convertvector(x - looking.x, Floats), along = dx * m_x + dy * m_y;
-    const Ints near = (along < -0.499F) & (dx * dx + (dy * dy + 0.25F) + along <= looking.range2) &
-                      (low <= looking.high) & (high >= looking.low);
-    std::array<std::int32_t, kLanes> lanes;
-    store(near, lanes.data());
-    const std::uint32_t here = std::min(kLanes, end - n);
-    for (std::uint32_t lane = 0; lane < here; ++lane) {
-      found[count] = n + lane;
-      count += static_cast<std::size_t>(lanes[lane] & 1);
+  for (std::uint32_t begin = first; begin < end; begin += kLanes) {
+    for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+      const std::uint32_t n = begin + lane;
+      const auto dx = static_cast<float>(segments.x[n] - looking.x);
+      const float along = dx * segments.m_x[n] + dy * segments.m_y[n];
+      near[lane] = (along < -0.499F) & (dx * dx + (dy * dy + 0.25F) + along <= looking.range2) &
+                   (segments.low[n] <= looking.high) & (segments.high[n] >= looking.low);
+    }
+    for (std::uint32_t lane = 0; lane < std::min(kLanes, end - begin); ++lane) {
+      found[count] = begin + lane;
+      count += near[lane];
     }
   }
   return count;
@@ -140,40 +135,17 @@ void decide(const Elements& elements, std::size_t count, const std::uint64_t* hi
   }
 }
 
-namespace {
-
-struct LookInside {
-  template <std::size_t kPiece>
-  [[gnu::always_inline]] static Inside run(const std::uint64_t* words, std::size_t count, int turn, std::uint64_t band,
-                                           std::uint64_t* inside) noexcept {
-    using Piece = typename Native<kPiece>::Words;
-    constexpr std::size_t kWords = kPiece / sizeof(std::uint64_t);
-    constexpr std::array<std::uint64_t, kEight> kFirst{1, 2, 4, 8, 16, 32, 64, 128};
-    const auto up = static_cast<unsigned>(turn) & 63, down = (64 - up) & 63;
-    Piece at, some{}, full{};
-    load(at, kFirst.data());
-    for (std::size_t n = 0; n < count; n += kWords, at <<= kWords) {
-      Piece word;
-      load(word, words + n);
-      word = (word << up | word >> down) & band;
-      store(word, inside + n);
-      some |= word != 0 ? at : Piece{};
-      full |= word == band ? at : Piece{};
-    }
-    Inside all{};
-    for (std::size_t n = 0; n < kWords; ++n) {
-      all.some |= some[n];
-      all.full |= full[n];
-    }
-    return all;
-  }
-};
-
-}  // namespace
-
+BACKWASH_CLONES
 Inside look_inside(const std::uint64_t* words, std::size_t count, int turn, std::uint64_t band,
                    std::uint64_t* inside) noexcept {
-  return run_native<LookInside>(words, count, turn, band, inside);
+  const auto up = static_cast<unsigned>(turn) & 63, down = (64 - up) & 63;
+  Inside all{};
+  for (std::size_t n = 0; n < count; ++n) inside[n] = (words[n] << up | words[n] >> down) & band;
+  for (std::size_t n = 0; n < count; ++n) {
+    all.some |= std::uint64_t{inside[n] != 0} << n;
+    all.full |= std::uint64_t{inside[n] == band} << n;
+  }
+  return all;
 }
 
 namespace {
@@ -305,20 +277,14 @@ void sum_walls(const Walls& walls, int first, int last, int heights, Four* row, 
   for (int n = 0; n < walls.width; ++n) row[n] = Four{};
   for (int z = first; z <= last; ++z) {
     Four* numbers = walls.numbers + static_cast<std::ptrdiff_t>(z) * walls.width;
-    Quad number{};
+    Four number{};
     for (int n = 0; n < walls.width; ++n) {
-      Quad here, change;
-      load(here, row + n);
-      load(change, numbers + n);
-      here += change;
-      number += here;
-      store(here, row + n);
-      store(Quad{}, numbers + n);
+      row[n] += numbers[n];
+      number += row[n];
+      numbers[n] = Four{};
       if (z + n < 0 || z + n >= heights) continue;
-      Quad sum;
-      load(sum, sums + (z + n));
-      sum += walls.step[n] * number;
-      store(sum, sums + (z + n));
+      const double step = walls.step[n];
+      sums[z + n] += Four{step * number.xx, step * number.xy, step * number.yy, step * number.zz};
     }
   }
 }

@@ -69,7 +69,7 @@ void decide(const Elements& elements, std::size_t count, const std::uint64_t* hi
 struct Inside {
   std::uint64_t some, full;  ///< bit n: inside[n] is not 0, is the whole band
 };
-/// inside[n] = words[n], turned left by `turn`, within `band`, for `count` ≤ 64 words, rounded up to a multiple of 8.
+/// inside[n] = words[n], turned left by `turn`, within `band`, for `count` ≤ 64 words.
 /// Real-time: wait-free, no allocation.
 Inside look_inside(const std::uint64_t* words, std::size_t count, int turn, std::uint64_t band,
                    std::uint64_t* inside) noexcept;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstdio>
 
+#include "core/plan/plan_along.hpp"
 #include "core/plan/search/ends.hpp"
 #include "services/backwash/files.hpp"
 #include "services/backwash/json.hpp"
@@ -52,16 +53,19 @@ int run(const PlanOptions& options) {
   const plan::PlanStart start{State{*options.start, Vec3::Zero()}, hover};
   const CachedWorld cached(
       {std::move(grid), model, options.model, vehicle, options.vehicle, options.method, options.margin});
-  auto world = cached.kept();
-  std::optional<plan::Plan> refused;
-  if (!world) {
+  const auto planned = [&]() -> plan::Plan {
+    if (const auto world = cached.kept()) return plan::plan(*world, start, *options.goal, limits);
     progress("looking at both ends");
-    refused = plan::refused_at_once(cached.input().grid, model, vehicle, options.method, options.margin, start,
-                                    *options.goal, limits);
-    if (!refused) world = cached.made();
-  }
-  if (world) progress("planning");
-  const auto plan = world ? plan::plan(*world, start, *options.goal, limits) : *std::move(refused);
+    if (auto refused = plan::refused_at_once(cached.input().grid, model, vehicle, options.method, options.margin, start,
+                                             *options.goal, limits))
+      return *std::move(refused);
+    const auto make = [&](map::OccupancyGrid part, const map::OccupancyGrid* around) {
+      return world_of(
+          {std::move(part), model, options.model, vehicle, options.vehicle, options.method, options.margin, around});
+    };
+    return plan::plan_along(cached.input().grid, model, vehicle, make, start, *options.goal, limits);
+  };
+  const plan::Plan plan = planned();
   options.json ? print(to_json(plan, options.method, options.risk.has_value()))
                : print_text(plan, options.risk.has_value());
   if (plan.status == plan::PlanStatus::ok) return kOk;

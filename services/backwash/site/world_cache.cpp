@@ -78,13 +78,14 @@ std::string key_of(const WorldInput& input) {
                     vehicle = content_when_read(input.vehicle_path);
   if (program.empty() || model.empty() || vehicle.empty()) return "";
   const auto& grid = input.grid;
-  const double numbers[] = {grid.origin().x(), grid.origin().y(),         grid.origin().z(),
-                            grid.resolution(), input.margin.value_or(-1), input.model.bound.kappa};
+  const double numbers[] = {grid.resolution(), input.margin.value_or(-1), input.model.bound.kappa};
   std::string all = program;
   const int options[] = {field::run_native<VectorBytes>(), static_cast<int>(input.method)};
-  all +=
-      bytes_of(options, 2) + sha256(model) + sha256(vehicle) + bytes_of(numbers, 6) + bytes_of(grid.size().data(), 3);
-  all += sha256({reinterpret_cast<const char*>(grid.cells().data()), grid.cell_count()});
+  all += bytes_of(options, 2) + sha256(model) + sha256(vehicle) + bytes_of(numbers, 3);
+  for (const map::OccupancyGrid* of : {&grid, input.around})
+    if (of)
+      all += bytes_of(of->origin().data(), 3) + bytes_of(of->size().data(), 3) +
+             sha256({reinterpret_cast<const char*>(of->cells().data()), of->cell_count()});
   return sha256(all);
 }
 
@@ -178,7 +179,9 @@ std::shared_ptr<const plan::World> CachedWorld::kept() const {
 std::shared_ptr<const plan::World> CachedWorld::made() const {
   progress("building the world");
   const auto begin = std::chrono::steady_clock::now();
-  auto world = plan::build_world(input_.grid, input_.model, input_.vehicle, input_.method, input_.margin, run_shown);
+  auto world =
+      plan::rebuilt(plan::unbuilt_world(input_.grid, input_.model, input_.vehicle, input_.method, input_.margin),
+                    {.voxels = map::all_of(input_.grid.size()), .around = input_.around}, run_shown);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   if (!key_.empty() && took.count() > kWorthKeeping) keep(folder_, key_, plan::kept_of(*world));
   return world;

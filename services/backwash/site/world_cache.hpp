@@ -17,6 +17,7 @@ struct WorldInput {
   const std::string& vehicle_path;
   reach::Method method = reach::Method::tight;
   std::optional<double> margin = std::nullopt;  ///< m, in place of the sets
+  const map::OccupancyGrid* around = nullptr;   ///< as in plan::Change
 };
 
 /// Worlds that were made before. One that takes longer than half a second is kept in the user's cache, and an equal one
