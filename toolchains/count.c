@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A plugin of qemu-user that tells on stderr how many instructions of the emulated processor a program took. Debian ships
-// no qemu-plugin.h: what is declared here is what is used of it.
+// A plugin of qemu-user that tells on stderr how many instructions of the emulated processor a program took. Debian
+// ships no qemu-plugin.h: what is declared here is what is used of it.
 #include <inttypes.h>
 #include <stddef.h>
 #include <stdio.h>
