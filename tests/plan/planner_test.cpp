@@ -225,7 +225,7 @@ TEST(NearestApproach, IsTheLeastOfAllSteps) {
       const Vec3 p = middle + reach * Vec3(std::cos(turn * t), std::sin(turn * t), std::sin(3 * turn * t));
       PerDirection h;
       for (double& half : h) half = widest * (0.7 + 0.3 * unit(random));
-      tube.push_back({t, {p, Vec3::Zero()}, {}, h, h, {}, 0});
+      tube.push_back({t, {p, Vec3::Zero()}, {}, h, h, Mat3::Zero(), 0});
     }
     double least = 2 + reach::body_and_estimation(world.reach.vehicle);
     for (std::size_t k = 0; k < tube.size(); ++k)
