@@ -15,8 +15,9 @@
 namespace backwash::plan {
 namespace {
 
-constexpr double kFirst = 10;    ///< voxels about the way that are made first
-constexpr double kLonger = 1.1;  ///< length of a plan over that of the way, with which a better one is not looked for
+constexpr double kFirst = 10;      ///< voxels about the way that are made first
+constexpr double kMuch = 1.0 / 3;  ///< share of the places from which on the whole world costs little more
+constexpr double kLonger = 1.1;    ///< length of a plan over that of the way, with which a better one is not looked for
 
 /// What is known of a map: where a vehicle may be, and how far from the ways looked at.
 class Known {
@@ -45,19 +46,25 @@ class Known {
     // Wide places are more often safe.
     for (const Way& way : ways)
       if (const double length = length_of(way); length < kNone && length <= kLonger * shortest) {
-        take(way);
+        take(pulled(view, way.points));
         return length;
       }
     return kNone;
   }
 
-  /// What a vehicle reaches within so many metres of the ways is to be made; whether that is all it can reach.
-  bool reach(double metres) {
+  /// What a vehicle reaches within so many metres of the ways is to be made; its share of all places, 1 if there is no
+  /// more to reach.
+  double reach(double metres) {
+    std::size_t places = 0, made = 0;
     for (std::uint16_t& hops : hops_)
-      if (hops != kNever) hops = kUnreached;
+      if (hops != kNever) {
+        hops = kUnreached;
+        ++places;
+      }
     box_ = {};
     std::vector<Index3> front, next;
     for (const std::size_t n : seeds_) meet(map_.voxel(n), 0, next);
+    made += next.size();
     const int most = static_cast<int>(metres / map_.resolution());
     for (int hops = 1; hops <= most && !next.empty(); ++hops) {
       front.swap(next);
@@ -66,8 +73,9 @@ class Known {
         map::for_each_voxel({v - Index3::Ones(), v + Index3::Ones()}, [&](const Index3& u) {
           if (map_.inside(u)) meet(u, static_cast<std::uint16_t>(hops), next);
         });
+      made += next.size();
     }
-    return next.empty();
+    return next.empty() ? 1 : static_cast<double>(made) / static_cast<double>(places);
   }
 
   /// The map of that.
@@ -129,9 +137,27 @@ class Known {
     for (std::size_t n = 1; n < way.points.size(); ++n) length += (way.points[n] - way.points[n - 1]).norm();
     return length;
   }
-  void take(const Way& way) {
-    for (std::size_t n = 1; n < way.points.size(); ++n) {
-      const Vec3 &from = way.points[n - 1], step = way.points[n] - from;
+  /// The way without the points that a straight line passes by.
+  static std::vector<Vec3> pulled(const SafeView& view, const std::vector<Vec3>& way) {
+    const auto clear = [&](const Vec3& from, const Vec3& to) {
+      const Vec3 step = to - from;
+      const int parts = static_cast<int>(2 * step.norm() / view.space().resolution()) + 1;
+      for (int part = 0; part <= parts; ++part)
+        if (!view.passable(view.space().index(from + step * part / parts))) return false;
+      return true;
+    };
+    std::vector<Vec3> points{way.front()};
+    for (std::size_t n = 1; n < way.size(); ++n) {
+      std::size_t last = way.size() - 1;
+      while (last > n && !clear(points.back(), way[last])) --last;
+      n = last;
+      points.push_back(way[n]);
+    }
+    return points;
+  }
+  void take(const std::vector<Vec3>& way) {
+    for (std::size_t n = 1; n < way.size(); ++n) {
+      const Vec3 &from = way[n - 1], step = way[n] - from;
       const int parts = static_cast<int>(2 * step.norm() / map_.resolution()) + 1;
       for (int part = 0; part <= parts; ++part) seed(from + step * part / parts);
     }
@@ -167,15 +193,21 @@ Plan plan_along(const map::OccupancyGrid& map, const Model& model, const Vehicle
     return plan(*make(map, nullptr), start, goal_W, options);
   Known known(map, vehicle, start, goal_W);
   double way = known.take_way();
+  std::optional<Plan> longer;
   for (double metres = kFirst * map.resolution();; metres *= 4) {
-    const bool all = known.reach(metres);
+    if (known.reach(metres) > kMuch && way < Known::kNone) {
+      Plan found = plan(*make(map, nullptr), start, goal_W, options);
+      return found.status == PlanStatus::ok || !longer ? found : *std::move(longer);
+    }
     const auto world = make(known.part(), &map);
     Plan found = plan(*world, start, goal_W, options);
-    if (all || way == Known::kNone) return known.measured(*world, std::move(found), options.least_clearance_m);
+    found = known.measured(*world, std::move(found), options.least_clearance_m);
+    if (way == Known::kNone) return found;
     known.learn(*world, metres);
     way = known.take_way();
     if (way == Known::kNone || (found.status == PlanStatus::ok && found.metrics.length_m <= kLonger * way))
-      return known.measured(*world, std::move(found), options.least_clearance_m);
+      return found;
+    if (found.status == PlanStatus::ok) longer = std::move(found);
   }
 }
 

@@ -17,7 +17,8 @@ using MakeWorld =
 /// are farther from obstacles than the body leads there; made is what a vehicle reaches within 10 voxels of it, all
 /// else is unknown, and so an obstacle, and what is verified holds in the whole map. Where no plan is found there, or
 /// one more than a tenth longer than the way over what is safe or not made yet, more is made: four times as far, about
-/// that way, too. What ends without a plan has made all that can be reached, or no way is left. `model`: without the
+/// that way, too; the whole world where that is a third of it. What ends without a plan has made the whole world, or no
+/// way is left. `model`: without the
 /// vehicle's r0; with an extension by place, or a loop with an integrator, all is made at once.
 Plan plan_along(const map::OccupancyGrid& map, const Model& model, const Vehicle& vehicle, const MakeWorld& make,
                 const PlanStart& start, const Vec3& goal_W, const PlanOptions& options);

@@ -169,6 +169,8 @@ Approach nearest_approach(const World& world, const reach::ReachTube& tube) {
     const double motion = (tube[next(k)].center.p_W - tube[k].center.p_W).norm();
     const double distance = world.distance.interpolated(tube[k].center.p_W);
     bound[k] = distance - slack - extent - motion;
+    if (!std::isfinite(bound[k]))
+      return {-taken, tube[k].center, tube[k].t};  // no number: nothing is known to be clear
     if (k % kPiece == 0) pieces.emplace_back(bound[k], k);
     pieces.back().first = std::min(pieces.back().first, bound[k]);
     least = std::min(least, distance + slack);  // the set holds its centre

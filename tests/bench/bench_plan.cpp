@@ -3,9 +3,7 @@
 // model, v_max 3 m/s, a_max 2 m/s²: what Fast-Planner's launch defaults fly (there: 200 queries, horizon 7 m, search
 // 0.44 ms mean and 0.84 ms p95, optimisation 3.2 ms mean, 3 of 200 in collision, 105 of 200 beyond a limit).
 //
-// forest/first/N and forest/polished/N (until the first verified trajectory, as the ancestor's figures are, and with
-// the evaluations of PlanOptions::polish on top): 200 queries whose hover-safe start and goal are drawn at random, at
-// rest, N m apart at most and 80 % of that at least, flown to a stop exactly at the goal. N is the ancestor's horizon
+// forest/N: 200 queries whose hover-safe start and goal are drawn at random, at rest, N m apart at most and 80 % of that at least, flown to a stop exactly at the goal. N is the ancestor's horizon
 // of 7 m, where it may end moving anywhere beyond, and 20 and 60 m for the growth of the cost (60 m in two forests end
 // to end, 300 pillars, 20 rings). jerk2: the sum over the queries of the trajectories' ∫‖jerk‖² dt. World (distance,
 // field, hover map) is built before timing. Each query is planned three times and counts with its median; times are CPU
@@ -19,7 +17,7 @@
 //
 // search_tail/V: the search alone at v_max V mm/s, 1,000 queries: quantiles and largest.
 //
-// set_extent: what the collision cost takes off the distance, ‖h‖₂ of a set (the scalar way) over what its own prism
+// set_extent: what is taken off the distance, ‖h‖₂ of a set (the scalar way) over what its own prism
 // takes (exact distance of the centre less that of the prism), over the steps of the forest's plans nearer than 0.5 m.
 #include <benchmark/benchmark.h>
 #include <time.h>

@@ -218,13 +218,14 @@ TEST(NearestApproach, IsTheLeastOfAllSteps) {
   int touching = 0;
   for (int draw = 0; draw < 300; ++draw) {
     const Vec3 middle(0.5 + 5 * unit(random), 0.5 + 3 * unit(random), 0.4 + 0.8 * unit(random));
-    const double turn = 8 * unit(random), reach = 0.5 * unit(random), widest = 0.25 * unit(random);
+    const double turn = 8 * unit(random), reach = 0.5 * unit(random), widest = 0.5 * unit(random);
     reach::ReachTube tube;
     for (std::size_t k = 0; k < 70; ++k) {
       const double t = 0.02 * static_cast<double>(k);
       const Vec3 p = middle + reach * Vec3(std::cos(turn * t), std::sin(turn * t), std::sin(3 * turn * t));
       PerDirection h;
       for (double& half : h) half = widest * (0.7 + 0.3 * unit(random));
+      h[kZ] *= 0.3;
       tube.push_back({t, {p, Vec3::Zero()}, {}, h, h, Mat3::Zero(), 0});
     }
     double least = 2 + reach::body_and_estimation(world.reach.vehicle);
@@ -238,6 +239,16 @@ TEST(NearestApproach, IsTheLeastOfAllSteps) {
   }
   EXPECT_GT(touching, 20);
   EXPECT_LT(touching, 280);
+}
+
+TEST(NearestApproach, WhatIsNoNumberIsNotClear) {
+  for (const std::size_t k : {0u, 8u, 39u}) {
+    reach::ReachTube width = still_tube({1.5, 2, 0.8}, 40, 0.05), place = width;
+    width[k].half_widths_interval[kX] = NAN;
+    place[k].center.p_W.y() = NAN;
+    EXPECT_LT(nearest_approach(gap_world(), width).clearance, 0) << k;
+    EXPECT_LT(nearest_approach(gap_world(), place).clearance, 0) << k;
+  }
 }
 
 TEST(TakeoffColumn, FindsTheFloorAndTheLowestClearHover) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "core/config/config.hpp"
 #include "core/map/load_map.hpp"
@@ -40,6 +41,28 @@ TEST(Refinement, WhatPlansReturnKeepsTheLimitsFromAnyMotion) {
       EXPECT_LE(hardest, 1.0 + 1e-6) << v.transpose() << " to " << goal.transpose();
     }
   EXPECT_GT(flown, 5);
+}
+
+// No timing suits every motion: what is tried ends soon, and is no flight of minutes.
+TEST(Refinement, StartsFromAnyMotionEndSoonAndInFlightsOfSeconds) {
+  const auto world =
+      build_world(map::builtin_scene("apartment", 0.2).value(), config::load_model("builtin:quad-5in").value(),
+                  config::load_vehicle("builtin:quad-5in").value());
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int flown = 0;
+  for (int draw = 0; draw < 200; ++draw) {
+    const Vec3 from(5 + 4 * unit(random), 4 + 3.5 * unit(random), 1.2 + 0.5 * unit(random)),
+        goal(5 + 4 * unit(random), 4 + 3.5 * unit(random), 1.2 + 0.5 * unit(random));
+    PlanStart start = moving(from, 0.5 * Vec3(unit(random), unit(random), unit(random)));
+    start.command.a_W = 0.7 * Vec3(unit(random), unit(random), unit(random));
+    const Plan p = plan(*world, start, goal, {.v_max = 1.5, .a_max = 2});
+    EXPECT_NE(p.status, PlanStatus::deadline);
+    if (p.status != PlanStatus::ok) continue;
+    ++flown;
+    EXPECT_LT(p.metrics.time_s, 10 + 4 * p.metrics.length_m);
+  }
+  EXPECT_GT(flown, 30);
 }
 
 // The searched pace is that of a cubic: a smoother curve need not take as long.

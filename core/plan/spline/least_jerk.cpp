@@ -15,11 +15,12 @@ namespace {
 constexpr std::size_t kSamples = 4;      ///< per knot span
 constexpr double kPenalty = 50;          ///< λ: of a bound broken by 1 m, over a third difference of 1 m
 constexpr int kRounds = 6, kSteps = 12;  ///< of bounds, of Newton's steps under the same bounds
-constexpr int kHalvings = 5;             ///< of a step
-constexpr double kSettled = 0.02;        ///< m that control points still move by in a round
-constexpr double kSettledStep = 0.002;   ///< and in a step
-constexpr double kFar = 0.5;             ///< m beyond what is asked: obstacles there are not seen
-constexpr double kExact = 0.3;           ///< m: nearer than this a flown set's clearance is measured with its prism
+constexpr int kFree = 2;      ///< rounds whose half-spaces go: between two walls each round would push to the other one
+constexpr int kHalvings = 5;  ///< of a step
+constexpr double kSettled = 0.02;       ///< m that control points still move by in a round
+constexpr double kSettledStep = 0.002;  ///< and in a step
+constexpr double kFar = 0.5;            ///< m beyond what is asked: obstacles there are not seen
+constexpr double kExact = 0.3;          ///< m: nearer than this a flown set's clearance is measured with its prism
 
 using Points = Eigen::Matrix<double, 3, Eigen::Dynamic>;
 
@@ -96,7 +97,7 @@ class Newton {
     for (Eigen::Index i = 2; i + 3 < q_.cols(); ++i)
       bound_each_axis(i, {-1, 1}, span * limits.velocity(static_cast<std::size_t>(i), span));
     for (Eigen::Index i = 1; i + 3 < q_.cols(); ++i) bound_each_axis(i, {1, -2, 1}, span * span * limits.a);
-    of_limits_ = bounds_.size();
+    lasting_ = bounds_.size();
     if (flown) measure(*flown);
   }
 
@@ -105,6 +106,7 @@ class Newton {
     for (int round = 0; round < kRounds && free() > 0; ++round) {
       const Points before = q_;
       minimise();
+      if (round >= kFree) lasting_ = bounds_.size();
       const Points wanted = q_;
       for (double share = 1; share > 0.1 && !(q_ = before + share * (wanted - before), look_around()); share /= 2) {
       }
@@ -169,7 +171,7 @@ class Newton {
   }
   /// The half-space that an obstacle leaves to each sample; false where one lies in an obstacle.
   bool look_around() {
-    bounds_.resize(of_limits_);
+    bounds_.resize(lasting_);
     return all_samples(q_, [&](std::size_t n, Eigen::Index first, const std::array<double, 4>& w, double) {
       const Vec3 command = sum(q_, first, w), p = flown_.empty() ? command : command + flown_[n].off;
       const auto [d, gradient] = world_.distance.linear(p);
@@ -249,7 +251,8 @@ class Newton {
   Points q_;
   Banded jerk_;
   std::vector<Bound> bounds_;  // those of the limits first
-  std::size_t of_limits_ = 0, steps_ = 0;
+  std::size_t lasting_ = 0;    // bounds that stay
+  std::size_t steps_ = 0;
   std::vector<Sample> flown_;  // empty: none
 };
 

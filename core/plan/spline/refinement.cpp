@@ -16,6 +16,7 @@ namespace {
 constexpr double kOptimiseShare = 0.97;        ///< of the limits: re-timing has little left to do
 constexpr double kFirstMargin = 0.02;          ///< m beyond the set, in the first round
 constexpr double kMoreMargin = 0.02;           ///< m, after each round that fails verification
+constexpr double kMostStretch = 1.5;           ///< of a curve's time, for the limits' sake
 constexpr int kTries = 4;                      ///< per pace
 constexpr double kPaces[] = {1.0, 0.7, 0.45};  ///< share of the searched path's speed, and of the limit
 
@@ -50,20 +51,21 @@ BSpline with_knot_span(BSpline spline, const PlanStart& start, double knot_span)
   return spline;
 }
 
+bool at_rest(const PlanStart& start) { return start.command.v_W.isZero(0) && start.command.a_W.isZero(0); }
+
 /// The same curve as fast as the limits let it be. From a motion another pace is another curve: slower alone, where it
-/// must be.
+/// must be, and not every one is slow enough in kMostStretch times its time.
 BSpline retimed(BSpline spline, const PlanStart& start, const MotionLimits& limits) {
-  const bool at_rest = start.command.v_W.isZero(0) && start.command.a_W.isZero(0);
-  if (at_rest) {
+  if (at_rest(start)) {
     const double quickest = stretch_needed(spline, limits) * spline.knot_span;
     spline = with_knot_span(std::move(spline), start, std::max(quickest, kControlPeriod));
   }
-  for (int i = 0; i < 30; ++i) {
+  const double longest = kMostStretch * spline.knot_span;
+  for (;;) {
     const double stretch = stretch_needed(spline, limits);
-    if (stretch <= 1) break;
+    if (!(stretch > 1) || !(spline.knot_span <= longest)) return spline;
     spline = with_knot_span(std::move(spline), start, 1.0001 * std::min(stretch, 1.5) * spline.knot_span);
   }
-  return spline;
 }
 
 std::string touching(const Approach& nearest) {
@@ -102,16 +104,23 @@ class Refiner {
   /// Rounds from the searched path's spline: about hover sets first, then about the sets of what failed. The last is
   /// that spline itself: it lies where hovering is safe.
   void run(const BSpline& path, double pace) {
-    const MotionLimits limits{pace * limits_.v, pace * pace * limits_.a, limits_.v_start};
+    MotionLimits limits = limits_;
+    if (at_rest(start_)) limits = {pace * limits_.v, pace * pace * limits_.a, limits_.v_start};
     std::optional<Refined> failed;
     for (int round = 0; round < kTries; ++round) {
       result_.out_of_time = Clock::now() > deadline_;
       if (result_.out_of_time) return;
       const double margin = kFirstMargin + round * kMoreMargin;
       const BSpline& begun = failed ? failed->trajectory : path;
-      Refined candidate = fly(retimed(round + 1 < kTries ? optimised(begun, failed, margin) : path, start_, limits));
+      const BSpline curve = retimed(round + 1 < kTries ? optimised(begun, failed, margin) : path, start_, limits);
+      if (!(stretch_needed(curve, limits_) <= 1)) {
+        result_.why = "no timing keeps the limits from this start";
+        continue;
+      }
+      Refined candidate = fly(curve);
       if (verified(candidate)) {
         result_.found = std::move(candidate);
+        if (pace < 1 && at_rest(start_)) quicken(pace);
         return;
       }
       failed = std::move(candidate);
@@ -120,6 +129,17 @@ class Refiner {
   const Refinement& result() const noexcept { return result_; }
 
  private:
+  /// What passed at a slower pace may pass faster: at the limits, or half way to them.
+  void quicken(double pace) {
+    for (const double faster : {1.0, (1 + pace) / 2}) {
+      Refined candidate = fly(retimed(result_.found->trajectory, start_,
+                                      {faster * limits_.v, faster * faster * limits_.a, limits_.v_start}));
+      if (!verified(candidate)) continue;
+      result_.found = std::move(candidate);
+      return;
+    }
+  }
+
   Refined fly(const BSpline& spline) {
     const auto begun = Clock::now();
     Refined flight{spline, spline.commands(), {}, 0};
@@ -151,9 +171,8 @@ class Refiner {
       result_.why = too_risky(world_, candidate.risk);
       return false;
     }
-    if (clear && stretch_needed(candidate.trajectory, limits_) <= 1) return true;
-    result_.why = clear ? "no timing keeps the limits from this start" : touching(nearest);
-    return false;
+    if (!clear) result_.why = touching(nearest);
+    return clear;
   }
 
   const World& world_;
