@@ -59,7 +59,7 @@ XDG_DATA_DIRS=/nonexistent "$backwash" fly --map builtin:apartment --report bare
 look bare.html . 900
 
 PYTHONPATH=$source_dir/tests/system python3 - "$backwash" <<'PYTHON'
-import csv, io, json, random, re, struct, subprocess, sys, tomllib
+import csv, io, itertools, json, random, re, struct, subprocess, sys, tomllib
 import raw_log
 
 pages = {name: json.load(open(f"{name}.json")) for name in ("flight", "simulated", "failed", "ground", "told", "bare")}
@@ -85,6 +85,14 @@ for name in ("flight", "simulated", "failed"):
 model = tomllib.loads(subprocess.run([sys.argv[1], "vehicle", "print", "builtin:quad-5in", "--kind", "model"], capture_output=True, text=True, check=True).stdout)
 kappa, mean = model["bound"]["kappa"], model["bound"]["mean"]["vertical"]
 table = lambda text: [{k: float(v or "nan") for k, v in row.items()} for row in csv.DictReader(io.StringIO(text))]
+def bounds_at(places):
+    with open("points.csv", "w") as file:
+        file.write("x_m,y_m,z_m\n" + "".join(f"{x},{y},{z}\n" for x, y, z in places))
+    asked = json.loads(subprocess.run([sys.argv[1], "field", "--map", "builtin:apartment", "--model", "builtin:quad-5in", "--vehicle", "builtin:quad-5in", "--points", "points.csv",
+                                       "--json"], capture_output=True, text=True, check=True).stdout)["points"]
+    return [kappa * point["sigma"][5] ** 0.5 + mean for point in asked]
+
+
 for name in ("flight", "simulated", "told"):
     plane = pages[name]["worked"]["plane"]
     assert plane["off"]["hidden"] == 5 and plane["again"]["hash"] == plane["off"]["hash"], "it is not off where it shall be"
@@ -96,17 +104,17 @@ for name in ("flight", "simulated", "told"):
         axis = "xyz"[int(kind["kind"])]
         assert len(cells) > 300 and {f"{axis} = {cell[axis + '_m']:.2f} m" for cell in cells} == {kind["told"]}, (name, kind["told"])
     some = random.Random(1).sample([cell for kind in plane["kinds"] for cell in table(kind["csv"])], 60)
-    with open("points.csv", "w") as file:
-        file.write("x_m,y_m,z_m\n" + "".join(f"{c['x_m']},{c['y_m']},{c['z_m']}\n" for c in some))
-    asked = json.loads(subprocess.run([sys.argv[1], "field", "--map", "builtin:apartment", "--model", "builtin:quad-5in", "--vehicle", "builtin:quad-5in", "--points", "points.csv",
-                                       "--json"], capture_output=True, text=True, check=True).stdout)["points"]
-    for cell, point in zip(some, asked, strict=True):
-        bound = kappa * point["sigma"][5] ** 0.5 + mean
+    told = bounds_at([(c["x_m"], c["y_m"], c["z_m"]) for c in some])
+    for cell, bound in zip(some, told, strict=True):
         assert bound * (1 - 1e-6) <= cell["vertical_bound_mps2"] <= bound * (1 + 6e-4), (name, cell, bound)
     place = min(table(pages[name]["worked"]["files"]["path.csv"]), key=lambda row: abs(row["t_s"] - pages[name]["worked"]["cursors"][0]["t"]))
     here = float(re.search(r"([0-9.]+) m/s²", plane["here"])[1])
-    near = [c["vertical_bound_mps2"] for c in table(plane["kinds"][0]["csv"]) if all(abs(c[a] - place[a]) < 0.051 for a in ("x_m", "y_m"))]
-    assert abs(place["z_m"] - table(plane["kinds"][0]["csv"])[0]["z_m"]) > 0.06 or any(abs(here - bound) < 6e-3 for bound in near), (plane["here"], place, near)
+    # The body may be at a voxel's edge, and its place between two rows of the path: of the voxels within 3 cm one says that.
+    centre = lambda value, of: of + round((value - of) / 0.1) * 0.1
+    cell = table(plane["kinds"][0]["csv"])[0]
+    about = {tuple(round(centre(place[a] + off, cell[a]), 6) for a, off in zip(("x_m", "y_m", "z_m"), offs)) for offs in itertools.product((-0.03, 0.03), repeat=3)}
+    bounds = bounds_at(about)
+    assert any(abs(here - bound) < 6e-3 for bound in bounds), (plane["here"], place, bounds)
 bare = pages["bare"]["worked"]
 assert bare["scene"] == [None] and "error.csv" in bare["files"]
 assert "install Debian's libjs-three" in open("bare.html").read()
