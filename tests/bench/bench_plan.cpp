@@ -3,14 +3,15 @@
 // model, v_max 3 m/s, a_max 2 m/s²: what Fast-Planner's launch defaults fly (there: 200 queries, horizon 7 m, search
 // 0.44 ms mean and 0.84 ms p95, optimisation 3.2 ms mean, 3 of 200 in collision, 105 of 200 beyond a limit).
 //
-// forest/N: 200 queries whose hover-safe start and goal are drawn at random, at rest, N m apart at most and 80 % of that at least, flown to a stop exactly at the goal. N is the ancestor's horizon
-// of 7 m, where it may end moving anywhere beyond, and 20 and 60 m for the growth of the cost (60 m in two forests end
-// to end, 300 pillars, 20 rings). jerk2: the sum over the queries of the trajectories' ∫‖jerk‖² dt. World (distance,
-// field, hover map) is built before timing. Each query is planned three times and counts with its median; times are CPU
-// time of the thread in ms (search: the same search called alone; verify: the planner's own wall clock). kernel: 10⁶
-// look-ups of the distance field at random points, in the same run. Judged here and not by the planner: a trajectory
-// collides if a point of it, every millisecond, is nearer to an obstacle than the body's radius (exact distance); it
-// breaks a limit if velocity or acceleration of an axis pass theirs.
+// forest/N: 200 queries whose hover-safe start and goal are drawn at random, at rest, N m apart at most and 80 % of
+// that at least, flown to a stop exactly at the goal. N is the ancestor's horizon of 7 m, where it may end moving
+// anywhere beyond, and 20 and 60 m for the growth of the cost (60 m in two forests end to end, 300 pillars, 20 rings).
+// jerk2: the sum over the queries of the trajectories' ∫‖jerk‖² dt. World (distance, field, hover map) is built before
+// timing. Each query is planned three times and counts with its median; times are CPU time of the thread in ms (search:
+// the same search called alone; verify: the planner's own wall clock). kernel: 10⁶ look-ups of the distance field at
+// random points, in the same run. Judged here and not by the planner: a trajectory collides if a point of it, every
+// millisecond, is nearer to an obstacle than the body's radius (exact distance); it breaks a limit if velocity or
+// acceleration of an axis pass theirs.
 //
 // success/SCENE: pairs drawn anywhere; exists counts those that an exhaustive search over hover-safe voxels joins,
 // found the plans, wrong the pairs it cannot join whose status is anything but no_path.
