@@ -1,12 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What tests of plans draw: boxes of voxels, random vectors.
+// What tests of plans share: a vehicle, boxes of voxels, random vectors.
 #pragma once
 
 #include <random>
 
 #include "core/map/occupancy_grid.hpp"
+#include "core/types/vehicle.hpp"
 
 namespace backwash::plan {
+
+inline Vehicle test_vehicle() {
+  Vehicle v;
+  v.body = {0.16, 0.18, 0.0635, 0.9};
+  v.controller = {{10, 12}, {5.5, 6}, 0.02, 0, 0.05};
+  v.estimation.position = 0.02;
+  v.limits = {1.5, 2};
+  v.initial_error = {0.02, 0.05};
+  return v;
+}
 
 /// Every voxel of the box from `low` to `high` (m, map frame; on the faces of voxels) becomes `cell`.
 inline void fill(map::OccupancyGrid& grid, const Vec3& low, const Vec3& high, map::Cell cell) {
